@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,11 +13,8 @@ from manikin.body.strength import with_masses
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.simulation.carrying import CarriedPoints, Sensed, Touch
-from manikin.simulation.compile import SimulationModel, compile_model, obstacle_of, root_rotation
+from manikin.simulation.compile import SimulationModel, compile_model, obstacle_of
 from manikin.simulation.push_force import Push
-
-_NOTHING = (np.zeros((0, 2), dtype=int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-"""Contacts that carry in a step without any: geometries, points, normals, forces, friction."""
 
 _INERTIAL = (
     "body_mass", "body_ipos", "body_iquat", "body_inertia", "body_subtreemass", "body_invweight0", "dof_M0",
@@ -59,25 +57,55 @@ class Grip:
         return cls(effector, position, max_force, mass / time**2, 2.0 * mass / time)
 
 
+class _EngineStep(NamedTuple):
+    """What is kept of one engine step of k contact points until it is looked at; all of its beginning.
+
+    Attributes:
+        time: [s].
+        root: (3,) position of the root [m].
+        rotation: (9,) matrix from the root's axes to the world's.
+        force: (6,) generalised force of all contacts on the root: in world axes [N], in its own [N.m].
+        others: (6,) wrench of grips, less that of contacts on which the body only leans [N, N.m].
+        geoms: (k, 2) geometries.
+        depths: (k,) penetration [m].
+        positions: (k, 3) [m].
+        frames: (k, 9) contact frames, whose first axis goes from the first geometry to the second.
+        friction: (k, 5) coefficients.
+        forces: (k,) normal forces [N].
+    """
+
+    time: float
+    root: FloatArray
+    rotation: FloatArray
+    force: FloatArray
+    others: FloatArray
+    geoms: NDArray[np.int32]
+    depths: FloatArray
+    positions: FloatArray
+    frames: FloatArray
+    friction: FloatArray
+    forces: FloatArray
+
+
 class World:
     """The physics engine with a body in a scene; states go in and come out in Pinocchio's convention.
 
+    Engine steps are kept as they are and measured together, when something is asked about them.
+
     Attributes:
         model: The compiled body and scene.
-        penetration: Deepest penetration of any contact since the last reset, paddings apart [m].
-        padding_compression: Deepest penetration of a padding since the last reset [m].
     """
 
     def __init__(self, model: SimulationModel, padded: Sequence[str] = ()) -> None:
         """Make a world at rest in the zero configuration; the padded obstacles give way."""
         self.model = model
         self._model = copy.copy(model.mujoco)
+        self._root = model.body_id(model.body.segments[0].name)
         self._data = mujoco.MjData(self._model)
         self._before = (self._data.qpos.copy(), self._data.qvel.copy(), 0.0)
         # Segment or obstacle that each geometry belongs to, and whether it is a segment.
         names = [(name, obstacle_of(name)) for name in model.geom_names]
         self._owners = [(obstacle or name.split("/")[0], obstacle is None) for name, obstacle in names]
-        self._segments = frozenset(segment.name for segment in model.body.segments)
         self._planned = np.zeros((self._model.ngeom, self._model.ngeom), dtype=bool)
         self._leaning, self._leans = np.zeros_like(self._planned), False
         self._padded = np.array([name in padded and not segment for name, segment in self._owners])
@@ -89,10 +117,13 @@ class World:
         self._grips: dict[str, Grip] = {}
         self._grip_forces: dict[str, FloatArray] = {}
         self._touches: dict[tuple[str, str], Touch] = {}
-        self.penetration, self.padding_compression = 0.0, 0.0
+        self._penetration, self._padding_compression = 0.0, 0.0
         self._total, self._steps = np.zeros(6), 0
+        self._pending: list[_EngineStep] = []
         self._carried: list[tuple[NDArray, ...]] = []
+        self._carried_steps = 0
         self._is_segment = np.array([segment for _, segment in self._owners], dtype=bool)
+        self._names = np.array([name for name, _ in self._owners], dtype=object)
 
     @property
     def time(self) -> float:
@@ -120,10 +151,12 @@ class World:
 
     def forget(self) -> None:
         """Forget unplanned touches, the deepest penetrations and the wrenches so far."""
+        self._pending.clear()
         self._touches.clear()
-        self.penetration, self.padding_compression = 0.0, 0.0
+        self._penetration, self._padding_compression = 0.0, 0.0
         self._total[:], self._steps = 0.0, 0
         self._carried.clear()
+        self._carried_steps = 0
 
     def carry(self, masses: Mapping[str, float]) -> None:
         """Set the point masses that effectors carry, at rest in their frames [kg]; none sets all down."""
@@ -182,6 +215,7 @@ class World:
         Raises:
             InputError: If an obstacle is not in the scene.
         """
+        self._measure()
         self._planned = self._touching(pairs)
         self._leaning = self._touching(leaning) & ~self._planned
         self._leans = bool(self._leaning.any())
@@ -204,16 +238,14 @@ class World:
             self._before = (self._data.qpos.copy(), self._data.qvel.copy(), self.time)
             self._act()
             mujoco.mj_step(self._model, self._data)
-            self._note_contacts()
-            wrench = self._constraint_wrench()
-            self._total += wrench - self._leaning_wrench() if self._leans else wrench
-            self._steps += 1
+            self._pending.append(self._kept())
 
     def mean_wrench(self) -> FloatArray:
         """(6,) mean wrench of scene and grips on the body since the last call, about the world origin.
 
         Where the body only leans, nothing counts: it acts like a push. Impacts count by their share of time.
         """
+        self._measure()
         mean = self._total / max(self._steps, 1)
         self._total[:], self._steps = 0.0, 0
         return mean
@@ -223,24 +255,90 @@ class World:
 
         A point counts as often as it was met, each time with its force over the number of engine steps.
         """
-        steps, self._carried = self._carried or [_NOTHING], []
-        geoms, positions, normals, forces, friction = map(np.concatenate, zip(*steps, strict=True))
+        self._measure()
+        none = (
+            np.zeros((0, 2), dtype=np.int32),
+            np.zeros((0, 3)),
+            np.zeros((0, 3)),
+            np.zeros(0),
+            np.zeros(0),
+        )
+        geoms, positions, normals, forces, friction = map(np.concatenate, zip(none, *self._carried))
+        steps, self._carried, self._carried_steps = max(self._carried_steps, 1), [], 0
         second = self._is_segment[geoms[:, 1]]
-        own, other = np.where(second, geoms[:, ::-1].T, geoms.T).tolist()
+        own, other = np.where(second, geoms[:, ::-1].T, geoms.T)
         # The engine's normal goes from the first geometry to the second.
         normals = np.where(second, 1.0, -1.0)[:, None] * normals
-        names, others = (tuple(self._owners[geom][0] for geom in side) for side in (own, other))
-        return CarriedPoints(names, others, positions, normals, forces / len(steps), friction)
+        names, others = (tuple(self._names[side].tolist()) for side in (own, other))
+        return CarriedPoints(names, others, positions, normals, forces / steps, friction)
 
-    def _constraint_wrench(self) -> FloatArray:
-        """Wrench of all contacts and grips in the last step; inner forces cancel in the root."""
-        qpos, _, _ = self._before
-        force, local = self._data.qfrc_constraint[:3], self._data.qfrc_constraint[3:6]
-        moment = root_rotation(self.model.q_from_mujoco(qpos)) @ local
-        total = np.concatenate((force, cross(qpos[:3], force) + moment))
+    @property
+    def penetration(self) -> float:
+        """Deepest penetration of any contact since the last reset, paddings apart [m]."""
+        self._measure()
+        return self._penetration
+
+    @property
+    def padding_compression(self) -> float:
+        """Deepest penetration of a padding since the last reset [m]."""
+        self._measure()
+        return self._padding_compression
+
+    def _kept(self) -> _EngineStep:
+        """Copy of what was measured in the engine step that was just made."""
+        data, contact, (qpos, _, time) = self._data, self._data.contact, self._before
+        others = -self._leaning_wrench() if self._leans else np.zeros(6)
         for pull, position in self._grip_forces.values():
-            total += np.concatenate((pull, cross(position, pull)))
-        return total
+            others += np.concatenate((pull, cross(position, pull)))
+        geoms, first = contact.geom.copy(), contact.efc_address
+        forces = np.zeros(len(first))
+        if data.nefc:
+            forces = np.where(first >= 0, data.efc_force[np.maximum(first, 0)], 0.0)
+        return _EngineStep(
+            time, qpos[:3], data.xmat[self._root].copy(), data.qfrc_constraint[:6].copy(), others, geoms,
+            -contact.dist, contact.pos.copy(), contact.frame.copy(), contact.friction.copy(), forces,
+        )  # fmt: skip
+
+    def _measure(self) -> None:
+        """Take the steps that were kept into the wrenches, touches and penetrations."""
+        steps, self._pending = self._pending, []
+        if not steps:
+            return
+        times, roots, turns, forces, others = map(np.array, zip(*(step[:5] for step in steps)))
+        force, moment = forces[:, :3], np.einsum("sij,sj->si", turns.reshape(-1, 3, 3), forces[:, 3:])
+        # Inner forces cancel in the root.
+        self._total += (np.hstack([force, cross(roots, force) + moment]) + others).sum(axis=0)
+        self._steps += len(steps)
+        self._carried_steps += len(steps)
+        geoms, depths, positions, frames, friction, pressing = map(
+            np.concatenate, zip(*(s[5:] for s in steps))
+        )
+        first, second = geoms.T
+        carries = (self._is_segment[first] != self._is_segment[second]) & (pressing > 0.0)
+        carries &= ~self._leaning[first, second]
+        self._carried.append((
+            geoms[carries], positions[carries], frames[carries, :3], pressing[carries], friction[carries, 0],
+        ))  # fmt: skip
+        unplanned = np.flatnonzero(~self._planned[first, second])
+        if len(unplanned):
+            number = np.repeat(np.arange(len(steps)), [len(step.geoms) for step in steps])
+            self._note_touches(times[number[unplanned]], geoms[unplanned], pressing[unplanned])
+        if self._pads:
+            padded = self._padded[geoms].any(axis=1)
+            deepest = float(depths[padded].max(initial=0.0))
+            self._padding_compression = max(self._padding_compression, deepest)
+            depths = depths[~padded]
+        self._penetration = max(self._penetration, float(depths.max(initial=0.0)))
+
+    def _note_touches(self, times: FloatArray, geoms: NDArray[np.int32], forces: FloatArray) -> None:
+        """Remember unplanned contact points at times [s] with their normal forces [N]."""
+        pressed: dict[tuple[float, str, str], float] = {}
+        for time, (first, second), force in zip(times.tolist(), geoms.tolist(), forces.tolist(), strict=True):
+            key = time, *self._parties(first, second)[:2]
+            pressed[key] = pressed.get(key, 0.0) + force
+        for (time, *pair), force in pressed.items():
+            known = self._touches.setdefault((pair[0], pair[1]), Touch(time, *pair))
+            self._touches[pair[0], pair[1]] = replace(known, force=max(known.force, force))
 
     def _leaning_wrench(self) -> FloatArray:
         """Wrench of the contacts of the last step in which the body only leans on something."""
@@ -278,35 +376,6 @@ class World:
         self._data.xfrc_applied[body, 3:] += cross(position - self._data.xipos[body], force)
         self._grip_forces[grip.effector] = np.stack((force, position))
 
-    def _note_contacts(self) -> None:
-        if self._data.ncon == 0:
-            self._carried.append(_NOTHING)
-            return
-        contact = self._data.contact
-        geoms, depths, forces = contact.geom, -contact.dist, np.zeros(self._data.ncon)
-        if self._data.nefc:
-            first = contact.efc_address
-            forces = np.where(first >= 0, self._data.efc_force[np.maximum(first, 0)], 0.0)
-        carries = (self._is_segment[geoms[:, 0]] != self._is_segment[geoms[:, 1]]) & (forces > 0.0)
-        carries &= ~self._leaning[geoms[:, 0], geoms[:, 1]]
-        self._carried.append((
-            geoms[carries], contact.pos[carries], contact.frame[carries, :3], forces[carries],
-            contact.friction[carries, 0],
-        ))  # fmt: skip
-        if self._pads:
-            padded = self._padded[geoms].any(axis=1)
-            self.padding_compression = max(self.padding_compression, float(depths[padded].max(initial=0.0)))
-            depths = depths[~padded]
-        self.penetration = max(self.penetration, float(depths.max(initial=0.0)))
-        planned = self._planned[geoms[:, 0], geoms[:, 1]]
-        pressed: dict[tuple[str, str], float] = {}
-        for (first, second), force in zip(geoms[~planned], forces[~planned], strict=True):
-            segment, other, _ = self._parties(int(first), int(second))
-            pressed[segment, other] = pressed.get((segment, other), 0.0) + float(force)
-        for pair, force in pressed.items():
-            known = self._touches.get(pair, Touch(self._before[2], *pair))
-            self._touches[pair] = replace(known, force=max(known.force, force))
-
     def touching(self, segments: Sequence[str], obstacle: str) -> bool:
         """Whether one of the segments was in contact with the obstacle in the last engine step."""
         geoms = self._data.contact.geom
@@ -329,21 +398,21 @@ class World:
     def sense(self) -> Sensed:
         """Return accelerations and contact forces of the last engine step."""
         qpos, qvel, time = self._before
-        contact = self._data.contact
-        parties = [self._parties(first, second) for first, second in contact.geom.tolist()]
+        contact, efc_force = self._data.contact, self._data.efc_force
+        geoms, frames = contact.geom, contact.frame.reshape(-1, 3, 3)
+        swapped = ~self._is_segment[geoms[:, 1]]
+        own, other = np.where(swapped, geoms.T, geoms[:, ::-1].T)
         # The engine's contact frame has x from the first geometry to the second, on which its force acts.
-        sign = np.array([-1.0 if swapped else 1.0 for *_, swapped in parties]).reshape(-1, 1)
-        frames, forces = np.array(contact.frame).reshape(-1, 3, 3), np.zeros((self._data.ncon, 6))
-        for number, force in enumerate(forces):
-            mujoco.mj_contactForce(self._model, self._data, number, force)
+        sign, address = np.where(swapped, -1.0, 1.0)[:, None], contact.efc_address
+        forces = np.zeros((len(geoms), 3))
+        acts = np.flatnonzero(address >= 0)
+        forces[acts] = efc_force[address[acts, None] + np.arange(3)]
         return Sensed(
             time, self.model.a_from_mujoco(qpos, qvel, self._data.qacc),
-            segments=tuple(segment for segment, _, _ in parties),
-            others=tuple(other for _, other, _ in parties),
-            on_scene=np.array([other not in self._segments for _, other, _ in parties], dtype=bool),
-            positions=np.array(contact.pos).reshape(-1, 3), normals=sign * frames[:, 0],
-            forces=sign * np.einsum("ki,kij->kj", forces[:, :3], frames),
-            depths=-np.array(contact.dist).reshape(-1), grips=dict(self._grip_forces),
+            segments=tuple(self._names[own].tolist()), others=tuple(self._names[other].tolist()),
+            on_scene=~self._is_segment[other], positions=contact.pos.copy(), normals=sign * frames[:, 0],
+            forces=sign * np.einsum("ki,kij->kj", forces, frames), depths=-contact.dist,
+            grips=dict(self._grip_forces),
         )  # fmt: skip
 
     def _parties(self, first: int, second: int) -> tuple[str, str, bool]:
@@ -356,6 +425,7 @@ class World:
     @property
     def touches(self) -> tuple[Touch, ...]:
         """Touches that were not planned since the last reset, in order of their first time."""
+        self._measure()
         return tuple(self._touches.values())
 
     @property
