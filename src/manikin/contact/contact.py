@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
@@ -171,7 +172,7 @@ class Contact(Displayed):
         side = float(np.clip(rotation[:, 1] @ frame[:, 1], -1.0, 1.0))
         return float(np.linalg.norm(off)), float(np.hypot(np.arccos(side), min(pitch, 0.0)))
 
-    @property
+    @cached_property
     def hangs_over(self) -> bool:
         """Whether it is a full sole of which only a part is on its surface: no rectangle about its frame."""
         if self.kind is not ContactKind.SOLE or self.part is not SolePart.FULL:
@@ -204,10 +205,10 @@ class Contact(Displayed):
         tip = max(0.5 * self.length, float(toes[:, 0].max()))
         return area >= LEAST_TOES * (tip - hinge) * self.width
 
-    @property
+    @cached_property
     def centre(self) -> FloatArray:
         """(3,) middle of the points in the contact frame [m]; the origin for a full sole."""
-        return 0.5 * (self.points.min(axis=0) + self.points.max(axis=0))
+        return frozen_array(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)), "centre [m]")
 
     @property
     def normal(self) -> FloatArray:
@@ -225,12 +226,12 @@ class Contact(Displayed):
         forward = self.rotation_contact_to_world[:, 0]
         return float(np.arctan2(forward[1], forward[0]))
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Extent of the points along the contact's x axis [m]."""
         return float(np.ptp(self.points[:, 0]))
 
-    @property
+    @cached_property
     def width(self) -> float:
         """Extent of the points along the contact's y axis [m]."""
         return float(np.ptp(self.points[:, 1]))

@@ -6,9 +6,10 @@ rolling never costs margin against single support.
 """
 
 import itertools
+from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -271,12 +272,20 @@ class ContactSchedule(Displayed):
 
     def phase_at(self, time: ArrayLike) -> NDArray[np.int64]:
         """Index of the phase ``[start, end)`` at each time [s]; outside, that of the first or the last."""
-        index = np.searchsorted(self.instants, time, side="right") - 1
-        return np.clip(index, 0, len(self.sequence) - 1)
+        return np.searchsorted(self.instants[1:-1], time, side="right")
+
+    def phase_held(self, time: float) -> Phase:
+        """The phase at one time [s], as of :meth:`phase_at`."""
+        return self.sequence[bisect_right(self._changes, time)]
 
     def stance_at(self, time: float) -> Stance:
         """Return the stance held at ``time`` [s]."""
-        return self.sequence[int(self.phase_at(time))].stance
+        return self.phase_held(time).stance
+
+    @cached_property
+    def _changes(self) -> list[float]:
+        """Instants between the phases [s]."""
+        return self.instants[1:-1].tolist()
 
     def support(self, time: ArrayLike, effectors: tuple[str, ...]) -> NDArray[np.bool_]:
         """(n, effectors) whether each effector is in contact at each time."""

@@ -6,7 +6,7 @@ equation of motion, which splits into six equalities (nothing acts on the root) 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -97,6 +97,7 @@ class ControlProblem:
         state: Dynamics it was built from.
         tasks: The tasks of its cost.
         contacts: The contacts whose forces are unknowns, in order.
+        variables: Indices of the force variables of each contact.
         joint_map: (nv - 6, n) with ``torque = joint_map @ x + joint_offset``.
         joint_offset: (nv - 6,) [N.m].
         partings: Number of rows, the last of the program, that keep parts of the body apart.
@@ -106,6 +107,7 @@ class ControlProblem:
     state: DynamicsState
     tasks: tuple[AccelerationTask, ...]
     contacts: tuple[LoadedContact, ...]
+    variables: tuple[slice, ...]
     joint_map: FloatArray
     joint_offset: FloatArray
     partings: int = 0
@@ -134,14 +136,13 @@ class ControlProblem:
         return {basis.contact.effector: float(basis.normal @ part) for basis, part in self._forces(x)}
 
     def _forces(self, x: FloatArray) -> Iterator[tuple[ContactForceBasis, FloatArray]]:
-        bases = [loaded.basis for loaded in self.contacts]
-        parts = force_variables(bases, len(self.state.v))
-        return ((basis, x[part]) for basis, part in zip(bases, parts, strict=True))
+        pairs = zip(self.contacts, self.variables, strict=True)
+        return ((loaded.basis, x[part]) for loaded, part in pairs)
 
 
 def force_variables(bases: Sequence[ContactForceBasis], start: int) -> list[slice]:
     """Indices of the force variables of each contact; those of the first one begin at ``start``."""
-    ends = np.cumsum([start, *(len(basis.normal) for basis in bases)]).tolist()
+    ends = accumulate((len(basis.normal) for basis in bases), initial=start)
     return [slice(first, end) for first, end in pairwise(ends)]
 
 
@@ -162,33 +163,34 @@ def build_qp(
         sum_cap: Largest sum of the normal forces [N], or None.
         partings: Parts of the body that keep apart.
     """
-    nv = len(state.v)
-    bases = [loaded.basis for loaded in contacts]
+    nv, bases = len(state.v), [loaded.basis for loaded in contacts]
     variables = force_variables(bases, nv)
-    generalised = np.concatenate([b.generalised for b in bases], axis=1) if bases else np.zeros((nv, 0))
-    size = nv + generalised.shape[1]
-    equation = np.concatenate((state.mass_matrix, -generalised), axis=1)
-    joint_map = equation[6:].copy()
-    joint_map[:, 6:nv] += np.diag(0.5 * period * damping)
-    joint_offset = state.bias[6:] + damping * state.v[6:]
+    size = variables[-1].stop if variables else nv
     caps, cap_limits, least = _normal_force_rows(contacts, variables, size, sum_cap)
-    parting = np.zeros((len(partings), size))
-    parting[:, :nv] = np.reshape([one.gradient for one in partings], (-1, nv))
-    slowest = np.array([one.least for one in partings])
-    rows = np.concatenate((equation[:6], joint_map, caps, parting))
+    rows = np.zeros((nv + len(caps) + len(partings), size))  # the equation of motion comes first
+    rows[:nv, :nv] = state.mass_matrix
+    lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+    lower[6:nv], upper[6:nv] = bounds.acceleration_lower, bounds.acceleration_upper
+    for loaded, part in zip(contacts, variables, strict=True):
+        basis = loaded.basis
+        np.negative(basis.generalised, out=rows[:nv, part])
+        share = 1.0 if basis.normal[0] > 0 else loaded.grasp_share
+        lower[part], upper[part] = basis.lower * share, basis.upper * share
+    joint_map = rows[6:nv]
+    joint_map[:, 6:nv].flat[:: nv - 5] += 0.5 * period * damping
+    joint_offset = state.bias[6:] + damping * state.v[6:]
+    rows[nv : nv + len(caps)] = caps
+    for row, parting in enumerate(partings, nv + len(caps)):
+        rows[row, :nv] = parting.gradient
+    slowest = np.array([parting.least for parting in partings])
     rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, least, slowest))
     free = np.full(len(slowest), np.inf)
     rows_upper = np.concatenate((-state.bias[:6], bounds.torque_upper - joint_offset, cap_limits, free))
-    shares = [np.where(item.basis.normal > 0, 1.0, item.grasp_share) for item in contacts]
-    fewest = [basis.lower * share for basis, share in zip(bases, shares, strict=True)]
-    most = [basis.upper * share for basis, share in zip(bases, shares, strict=True)]
-    lower = np.concatenate([np.full(6, -np.inf), bounds.acceleration_lower, *fewest])
-    upper = np.concatenate([np.full(6, np.inf), bounds.acceleration_upper, *most])
     hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
     for loaded, part in zip(contacts, variables, strict=True):
         if loaded.planned is not None:
             smallest = np.linalg.lstsq(loaded.basis.wrench, loaded.planned, rcond=RANK)[0]
-            hessian[part, part] += loaded.planned_weight * np.eye(len(smallest))
+            np.einsum("ii->i", hessian[part, part])[:] += loaded.planned_weight
             gradient[part] -= loaded.planned_weight * smallest
         if loaded.wished is not None:  # weight |force - wished|^2 / 2
             forces = loaded.basis.wrench[:3]
@@ -196,7 +198,14 @@ def build_qp(
             gradient[part] -= loaded.wish_weight * forces.T @ loaded.wished
     program = QuadraticProgram(hessian, gradient, rows, rows_lower, rows_upper, lower, upper, 6)
     return ControlProblem(
-        program, state, tuple(tasks), tuple(contacts), joint_map, joint_offset, len(partings)
+        program,
+        state,
+        tuple(tasks),
+        tuple(contacts),
+        tuple(variables),
+        joint_map,
+        joint_offset,
+        len(partings),
     )
 
 
@@ -233,7 +242,7 @@ def _cost(
     hessian[:nv, :nv] = weighted.T @ matrix
     diagonal = np.full(size, force_weight)
     diagonal[:nv] = acceleration_weight
-    hessian[np.diag_indices(size)] += diagonal
+    hessian.flat[:: size + 1] += diagonal
     gradient = np.zeros(size)
     gradient[:nv] = -target @ weighted
     return hessian, gradient
@@ -245,7 +254,7 @@ def _normal_force_rows(
     """Rows of the normal forces of contacts and of their sum, with their largest and smallest values [N]."""
     rows, limits, least = [], [], []
     for loaded, part in zip(contacts, variables, strict=True):
-        if loaded.basis.normal.any():
+        if loaded.basis.normal[0] > 0:
             row = np.zeros(size)
             row[part] = loaded.basis.normal
             rows.append(row)

@@ -170,7 +170,7 @@ class Controller:
 
     def carried_at(self, time: float) -> Mapping[str, float]:
         """Point masses [kg] that effectors carry at a time of the plan [s]."""
-        load = self.schedule.sequence[int(self.schedule.phase_at(time))].load
+        load = self.schedule.phase_held(time).load
         return {} if load is None else load.masses
 
     def problem(

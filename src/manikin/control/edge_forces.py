@@ -11,7 +11,7 @@ from manikin.body.limbs import hanging_segment, hinge_line
 from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
 from manikin.control.dynamics import DynamicsState, FrameState
 from manikin.numerics.polytope import chord, inset_polygon
-from manikin.numerics.spatial import FloatArray, cross, skew
+from manikin.numerics.spatial import FloatArray, skew
 from manikin.scene.surface import bar_radius
 
 MOST_ROLLED = 0.03
@@ -191,9 +191,11 @@ def contact_force_basis(
 
 def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
     """(6, e k) force and moment of each of the edges (e, 3) at each of the arms (k, 3)."""
-    force = np.broadcast_to(edges, (len(arms), *edges.shape))
-    wrench = np.concatenate((force, cross(arms[:, None, :], edges)), axis=2)
-    return np.ascontiguousarray(wrench.transpose(2, 0, 1)).reshape(6, -1)
+    wrench = np.empty((6, len(arms), len(edges)))
+    (x, y, z), (fx, fy, fz) = arms.T[:, :, None], edges.T
+    wrench[:3] = edges.T[:, None]
+    wrench[3:] = y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+    return wrench.reshape(6, -1)
 
 
 SLIDING_SPEED = 0.03

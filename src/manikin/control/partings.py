@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
 from manikin.body import BodyModel
@@ -95,17 +96,13 @@ class SelfWatch:
             return []
         model, data = self._model, self._data
         pin.updateGeometryPlacements(model, data, self._shapes, self._placed, state.q)
-        found = []
-        for index in due:
-            before, distance = self._gaps[index], self._distance(self._placed, index)
-            self._gaps[index] = distance
-            self._due[index] = self._step + max(1, int((distance - NEAR) / (FASTEST * period)))
-            # By how it changed, and a fifth more as it may have quickened: the rate itself takes longer.
-            rate, room = 1.2 * (distance - before) / period, distance - self._kept[index]
-            if distance >= NEAR or least_parting(room, rate, horizon) == -LARGEST:
-                continue
-            if self._planned_gap(reference, index) > distance + OFF_PLAN:
-                found.append(index)
+        gaps = np.array([self._distance(self._placed, index) for index in due])
+        wait = (gaps - NEAR) / (FASTEST * period)
+        # By how it changed, and a fifth more as it may have quickened: the rate itself takes longer.
+        rates, room = 1.2 * (gaps - self._gaps[due]) / period, gaps - self._kept[due]
+        self._gaps[due], self._due[due] = gaps, self._step + np.maximum(wait.astype(np.int64), 1)
+        close = np.flatnonzero((gaps < NEAR) & is_braked(room, rates))
+        found = [due[k] for k in close.tolist() if self._planned_gap(reference, due[k]) > gaps[k] + OFF_PLAN]
         if found:
             pin.computeJointJacobians(model, data, state.q)
             pin.forwardKinematics(model, data, state.q, state.v, self._rest)
@@ -151,6 +148,11 @@ class SelfWatch:
         drift = pin.getFrameClassicalAcceleration(model, data, frame, _WORLD_ALIGNED).vector
         along = drift[:3] + np.cross(drift[3:], arm) + np.cross(turning, np.cross(turning, arm))
         return jacobian[:3] - skew(arm) @ jacobian[3:], along
+
+
+def is_braked(room: FloatArray, rate: FloatArray) -> NDArray[np.bool_]:
+    """(n,) whether approaches have a least second derivative, as of :func:`least_parting`."""
+    return (room <= 0.0) | ((rate < 0.0) & (rate**2 > BRAKING * room))
 
 
 def least_parting(room: float, rate: float, horizon: float) -> float:

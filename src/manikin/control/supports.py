@@ -200,7 +200,7 @@ class SupportSwitch:
             return SupportState(
                 name, SupportMode.STANCE, interval.contact_at(time),
                 load_share=self._load_share(interval.contact, since),
-                unload_share=float(np.clip(falling, 0.0, 1.0)), planned=planned,
+                unload_share=min(max(falling, 0.0), 1.0), planned=planned,
                 fades=self._fades(interval, time), settling=settling,
             )  # fmt: skip
         if not planned:
@@ -219,7 +219,7 @@ class SupportSwitch:
             return 1.0
         rolls = contact.part is SolePart.TOES
         rising = since / (self._settings.rolling_load_time if rolls else self._settings.load_time)
-        return float(np.clip(rising, _FIRST_SHARE, 1.0)) ** (2 if rolls else 1)
+        return min(max(rising, _FIRST_SHARE), 1.0) ** (2 if rolls else 1)
 
     def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch.
@@ -227,7 +227,7 @@ class SupportSwitch:
         It sets out from there in time to land when it is planned to.
         """
         duration = _LIFTING_SHARE * (interval.start - interval.early)
-        share, hover = float(np.clip((time - interval.early) / duration, 0.0, 1.0)), self._hover(interval)
+        share, hover = min(max((time - interval.early) / duration, 0.0), 1.0), self._hover(interval)
         lift, rate = hover * share**2 * (3.0 - 2.0 * share), 6.0 * hover * share * (1.0 - share) / duration
         way, speed = self._settings.descent(interval.contact, time - self._sets_out(interval))
         normal = interval.contact.normal
@@ -251,13 +251,13 @@ class SupportSwitch:
         fades, settings = [], self._settings
         if (before := interval.part_before(time)) is not None:
             share = (time - before[1]) / settings.rolling_load_time
-            fades.append((before[0], float(np.clip(share, 0.0, 1.0)) ** 2))
+            fades.append((before[0], min(max(share, 0.0), 1.0) ** 2))
         if (after := interval.part_after(time)) is not None:
             share = (after[1] - time) / settings.unload_time
-            fades.append((after[0], float(np.clip(share, 0.0, 1.0))))
+            fades.append((after[0], min(max(share, 0.0), 1.0)))
         return tuple(item for item in fades if item[1] < 1.0)
 
     def _follow(self, name: str, time: float) -> float:
         """Feedback gains rise smoothly after a lift-off, where plan and reality differ in speed."""
         ends = [interval.end for interval in self._intervals[name] if interval.end <= time + 1e-9]
-        return float(np.clip((time - max(ends, default=-math.inf)) / self._settings.follow_time, 0.0, 1.0))
+        return min(max((time - max(ends, default=-math.inf)) / self._settings.follow_time, 0.0), 1.0)

@@ -6,6 +6,7 @@ Accelerations, linear in the generalised one, follow references by the impedance
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -165,11 +166,17 @@ def posture_task(
     joints: Sequence[int],
 ) -> AccelerationTask:  # fmt: skip
     """Follow the planned angles of some joints, all with the same weight."""
-    rows = np.asarray(joints, dtype=np.int64)
+    rows = list(joints)
     error, rate = reference.q[7:] - state.q[7:], reference.v[6:] - state.v[6:]
     wanted = reference.a[6:] + gains.stiffness * error + gains.damping * rate
-    jacobian = np.eye(len(rate), len(state.v), 6)[rows]
+    jacobian = _joint_rows(tuple(rows), len(state.v))
     return AccelerationTask(name, jacobian, wanted[rows], np.full(len(rows), weight))
+
+
+@lru_cache(maxsize=64)
+def _joint_rows(joints: tuple[int, ...], nv: int) -> FloatArray:
+    """(joints, nv) map from the generalised acceleration to that of some joints; read-only."""
+    return frozen_array(np.eye(nv - 6, nv, 6)[list(joints)], "rows of joints")
 
 
 def orientation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ within :data:`TOUCHING` of the surface, and wherever the engine's contact points
 count too. So the measured wrench lies in the wrench polytope of the stance, up to :data:`TOUCHING`.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -139,6 +140,7 @@ class CarryingContacts:
         """Start with the segments with which each effector touches, and the mass [kg] by which forces go."""
         self._segments, self._mass, self._least = dict(segments), mass, PRESSES * mass
         self._last: dict[str, Contact] = {}
+        self._stances: dict[tuple[ContactModel | int | None, ...], Stance] = {}
 
     def stance(
         self, points: CarriedPoints, pose: Callable[[str], Pose], planned: Mapping[str, Contact],
@@ -163,17 +165,21 @@ class CarryingContacts:
                 continue
             left &= ~chosen
             contacts.append(self._known(*_touched(contact, pose(name), points, chosen)))
-        for segment, other in dict.fromkeys(zip(points.segments, points.others, strict=True)):
+        pairs = zip(points.segments, points.others, left.tolist(), strict=True)
+        for segment, other in dict.fromkeys((segment, other) for segment, other, free in pairs if free):
             chosen = left & (np.array(points.others) == other) & points.of([segment])
             if points.forces[chosen].sum() >= self._least:
                 unplanned = _unplanned(f"{segment} on {other}", points, chosen)
                 contacts.append(self._known(unplanned, partial=True))
-        return Stance(contacts, model=model).bounded(self._mass)
+        key = model, *map(id, contacts)  # which the stance keeps
+        if key not in self._stances:
+            self._stances[key] = Stance(contacts, model=model).bounded(self._mass)
+        return self._stances[key]
 
     def _known(self, contact: Contact, partial: bool) -> Contact:
         """The same contact as before where it has not moved, so that stances can be told apart by it."""
         last = self._last.get(contact.effector)
-        if last is None or not _same_place(last, contact):
+        if last is None or not (last is contact or _same_place(last, contact)):
             last = replace(contact, points=_hull(contact.points)) if partial else contact
             self._last[contact.effector] = last
         return last
@@ -226,9 +232,10 @@ def _touched(
         corners = position + contact.points @ rotation.T
         corners = corners[np.abs((corners - centre) @ normal) <= TOUCHING]
         if len(corners) == len(contact.points):
-            whole = replace(contact, position=position - ((position - centre) @ normal) * normal)
-            if np.all(_beyond(whole, points.positions[chosen]) <= TOUCHING):
-                return (contact if _same_place(contact, whole) else whole), False
+            place = position - ((position - centre) @ normal) * normal
+            if np.all(_beyond(contact, place, points.positions[chosen]) <= TOUCHING):
+                still = math.dist(place, contact.position) <= TOUCHING
+                return (contact if still else replace(contact, position=place)), False
     else:
         corners = contact.points_in_world
     local = (np.vstack([corners, points.positions[chosen]]) - centre) @ contact.rotation_contact_to_world
@@ -236,9 +243,9 @@ def _touched(
     return replace(contact, position=centre, points=local, torsion_limit=None), True
 
 
-def _beyond(contact: Contact, positions: FloatArray) -> FloatArray:
-    """(k,) how far points lie outside the rectangle of a sole, along its axes, or outside its polygon [m]."""
-    local = (positions - contact.position) @ contact.rotation_contact_to_world - contact.centre
+def _beyond(contact: Contact, place: FloatArray, positions: FloatArray) -> FloatArray:
+    """(k,) how far points lie outside the rectangle of a sole at a place, or outside its polygon [m]."""
+    local = (positions - place) @ contact.rotation_contact_to_world - contact.centre
     if contact.hangs_over:
         return -signed_distance((local + contact.centre)[:, :2], contact.outline)
     return (np.abs(local[:, :2]) - 0.5 * np.array([contact.length, contact.width])).max(axis=1)

@@ -301,7 +301,7 @@ class _Run:
             max_limit_use=float(self.body.torque_share(executed.tau[:, 6:]).max(initial=0.0)),
             realtime_factor=len(recorder.samples) * self.period / wall, wall_s=wall,
             control_ms=1e3 * control / len(recorder.samples), touches=world.touches, counted_touches=touches,
-            fallbacks=tuple(fallbacks), max_slip_m=recorder.max_slip, friction=recorder.friction_use(),
+            fallbacks=tuple(fallbacks), max_slip_m=recorder.max_slip(), friction=recorder.friction_use(),
             push=push_outcome(self.pushes, recorder, self.failure), schedule=recorder.delayed_schedule(),
             final_foot_error_m=recorder.last_effector_error(),
         )  # fmt: skip

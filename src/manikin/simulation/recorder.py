@@ -1,6 +1,6 @@
 """Records every control step of an execution and turns them into a motion and its measures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +11,10 @@ from manikin.balance.motion_margin import MotionMargin
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
 from manikin.control.dynamics import DynamicsState
-from manikin.control.supports import SupportInterval, support_intervals
+from manikin.control.supports import SupportInterval, SupportState, support_intervals
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.signals import mask_runs
+from manikin.numerics.spatial import FloatArray, cross
 from manikin.simulation.carrying import PRESSES, CarriedPoints, CarryingContacts, Sensed, carried_margin
 
 SWITCHING = 0.1
@@ -27,14 +28,14 @@ class Sample:
     Attributes:
         sensed: Contact forces and acceleration at the beginning of the step.
         output: Decision of the controller there.
-        wrenches: (effectors, 6) measured force and moment about the planned contact's origin.
+        planned: Contact that each effector has, or in flight the one to come or else the last.
         total: (6,) mean over the step of the wrench of all contacts about the world origin.
         carried: Contact points that carried it.
     """
 
     sensed: Sensed
     output: ControlOutput
-    wrenches: FloatArray
+    planned: Mapping[str, Contact]
     total: FloatArray
     carried: CarriedPoints
 
@@ -54,20 +55,11 @@ class Recorder:
         self.effectors = schedule.sequence.effectors
         self.samples: list[Sample] = []
         self._intervals = {name: support_intervals(schedule, name, SWITCHING) for name in self.effectors}
-        self._landings: dict[str, FloatArray] = {}
-        self.max_slip = 0.0
 
     def record(self, sensed: Sensed, output: ControlOutput, mean: FloatArray, carried: CarriedPoints) -> None:
         """Add one control step: its first engine step, and the mean wrench (6,) of all its points."""
-        plan_time, wrenches = sensed.time - output.waited, []
-        for name in self.effectors:
-            self._measure_slip(name, output, plan_time)
-            contact = self._nearest_contact(name, plan_time)
-            if contact.kind is ContactKind.GRASP:
-                wrenches.append(sensed.grip_wrench(name, contact.position))
-            else:
-                wrenches.append(sensed.wrench(contact.position, self._segments[name]))
-        self.samples.append(Sample(sensed, output, np.array(wrenches), mean, carried))
+        planned = {name: self._nearest_contact(name, sensed.time - output.waited) for name in self.effectors}
+        self.samples.append(Sample(sensed, output, planned, mean, carried))
 
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""
@@ -76,16 +68,30 @@ class Recorder:
                 return interval.contact
         return self._intervals[name][-1].contact
 
-    def _measure_slip(self, name: str, output: ControlOutput, time: float) -> None:
-        support, position = output.supports[name], output.state.frames[name].position
-        held = support.mode is SupportMode.STANCE and support.load_share >= 1
-        rolls = support.contact is not None and support.contact.part is not SolePart.FULL
-        if not held or support.contact is None or rolls or self._schedule.settling(time, name)[0]:
-            self._landings.pop(name, None)
-            return
-        moved = position - self._landings.setdefault(name, position)
-        along = moved - (moved @ support.contact.normal) * support.contact.normal
-        self.max_slip = max(self.max_slip, float(np.linalg.norm(along)))
+    def max_slip(self) -> float:
+        """Farthest that an effector moved along its surface while it was held there [m].
+
+        Those that roll, slide to their places or begin to carry are not held.
+        """
+        times, most = np.array([sample.plan_time for sample in self.samples]), 0.0
+        for name in self.effectors:
+            supports = [sample.output.supports[name] for sample in self.samples]
+            contacts = [one.contact if _holds(one) else None for one in supports]
+            held = np.array([contact is not None for contact in contacts])
+            held &= ~self._schedule.settling(times, name)
+            for first, stop in mask_runs(held):
+                moved = self._positions(name, first, stop)
+                moved -= moved[0]
+                normals = np.array(
+                    [contact.normal for contact in contacts[first:stop] if contact is not None]
+                )
+                moved -= np.sum(moved * normals, axis=1)[:, None] * normals
+                most = max(most, float(np.linalg.norm(moved, axis=1).max()))
+        return most
+
+    def _positions(self, name: str, first: int = 0, stop: int | None = None) -> FloatArray:
+        """(n, 3) origin of an effector in some samples [m]."""
+        return np.array([s.output.state.frames[name].position for s in self.samples[first:stop]])
 
     def friction_use(self) -> FrictionUse:
         """Largest use of friction by the forces that control counted on, in the model of the plan.
@@ -93,15 +99,19 @@ class Recorder:
         Contacts that slide to their places are left out: kinetic friction is on the friction cone.
         """
         model = self._schedule.sequence[0].stance.friction_model
+        loads: dict[Contact, list[tuple[int, str, FloatArray]]] = {}
+        for number, sample in enumerate(self.samples):
+            for name, wrench in sample.output.wrenches.items():
+                support = sample.output.supports[name]
+                contact = support.contact
+                if contact is not None and not support.settling and contact.kind is not ContactKind.GRASP:
+                    loads.setdefault(contact, []).append((number, name, wrench[:3]))
         most = FrictionUse(model, 0.0, 0.0, "")
-        for sample in self.samples:
-            for name, support in sample.output.supports.items():
-                contact, wrench = support.contact, sample.output.wrenches.get(name)
-                if contact is None or wrench is None or support.settling or contact.kind is ContactKind.GRASP:
-                    continue
-                share = float(friction_share(contact, wrench[None, :3], model)[0])
-                if share > most.share:
-                    most = FrictionUse(model, share, sample.sensed.time, name)
+        for contact, pressed in loads.items():
+            shares = friction_share(contact, np.array([force for *_, force in pressed]), model)
+            if shares.max() > most.share:
+                number, name, _ = pressed[int(np.argmax(shares))]
+                most = FrictionUse(model, float(shares.max()), self.samples[number].sensed.time, name)
         return most
 
     def com_errors(self) -> FloatArray:
@@ -160,12 +170,33 @@ class Recorder:
 
     def _carrying_stance(self, carrying: CarryingContacts, sample: Sample) -> Stance:
         frames = sample.output.state.frames
-        planned = {name: self._nearest_contact(name, sample.plan_time) for name in self.effectors}
         return carrying.stance(
-            sample.carried, lambda name: (frames[name].position, frames[name].rotation), planned,
+            sample.carried, lambda name: (frames[name].position, frames[name].rotation), sample.planned,
             [name for name in self.effectors if name in sample.sensed.grips],
             self._schedule.stance_at(sample.plan_time).model,
         )  # fmt: skip
+
+    def _wrenches(self) -> FloatArray:
+        """(n, effectors, 6) measured force and moment on each effector about its planned contact's origin."""
+        sensed = [sample.sensed for sample in self.samples]
+        owner = np.repeat(np.arange(len(sensed)), [len(one.segments) for one in sensed])
+        segments = np.array([name for one in sensed for name in one.segments], dtype=object)
+        on_scene, places, forces = (
+            np.concatenate([getattr(one, key) for one in sensed])
+            for key in ("on_scene", "positions", "forces")
+        )
+        wrenches = np.zeros((len(sensed), len(self.effectors), 6))
+        for column, name in enumerate(self.effectors):
+            planned = [sample.planned[name] for sample in self.samples]
+            about = np.array([contact.position for contact in planned])
+            chosen = np.flatnonzero(on_scene & np.isin(segments, self._segments[name]))
+            rows, force = owner[chosen], forces[chosen]
+            moment = cross(places[chosen] - about[rows], force)
+            np.add.at(wrenches[:, column], rows, np.hstack([force, moment]))
+            for row, contact in enumerate(planned):
+                if contact.kind is ContactKind.GRASP:
+                    wrenches[row, column] = sensed[row].grip_wrench(name, contact.position)
+        return wrenches
 
     def motion(self, joint_names: Sequence[str], margin: FloatArray) -> Motion:
         """Turn the samples into a motion with its margin (n,) [N.m]."""
@@ -173,7 +204,7 @@ class Recorder:
             np.round([s.sensed.time for s in self.samples], 9) + 0.0,  # the engine adds up its steps
             [s.output.state for s in self.samples], a=np.array([s.sensed.a for s in self.samples]),
             tau=np.array([s.output.tau for s in self.samples]), margin=margin,
-            contact_force=np.array([s.wrenches for s in self.samples]),
+            contact_force=self._wrenches(),
             contact_names=tuple(self.effectors), joint_names=tuple(joint_names),
         )  # fmt: skip
 
@@ -196,6 +227,12 @@ def executed_motion(
         contact_force=contact_force,
         **series,
     )  # fmt: skip
+
+
+def _holds(support: SupportState) -> bool:
+    """Whether an effector carries fully with what does not roll."""
+    part = None if support.contact is None else support.contact.part
+    return support.mode is SupportMode.STANCE and support.load_share >= 1 and part is SolePart.FULL
 
 
 def _lengths(vectors: list[FloatArray]) -> FloatArray:

@@ -256,14 +256,10 @@ class World:
         A point counts as often as it was met, each time with its force over the number of engine steps.
         """
         self._measure()
-        none = (
-            np.zeros((0, 2), dtype=np.int32),
-            np.zeros((0, 3)),
-            np.zeros((0, 3)),
-            np.zeros(0),
-            np.zeros(0),
+        none = (np.zeros((0, 2), dtype=np.int32), *map(np.zeros, ((0, 3), (0, 3), 0, 0)))
+        geoms, positions, normals, forces, friction = map(
+            np.concatenate, zip(none, *self._carried, strict=True)
         )
-        geoms, positions, normals, forces, friction = map(np.concatenate, zip(none, *self._carried))
         steps, self._carried, self._carried_steps = max(self._carried_steps, 1), [], 0
         second = self._is_segment[geoms[:, 1]]
         own, other = np.where(second, geoms[:, ::-1].T, geoms.T)
@@ -304,15 +300,14 @@ class World:
         steps, self._pending = self._pending, []
         if not steps:
             return
-        times, roots, turns, forces, others = map(np.array, zip(*(step[:5] for step in steps)))
+        times, roots, turns, forces, others = map(np.array, zip(*(step[:5] for step in steps), strict=True))
         force, moment = forces[:, :3], np.einsum("sij,sj->si", turns.reshape(-1, 3, 3), forces[:, 3:])
         # Inner forces cancel in the root.
         self._total += (np.hstack([force, cross(roots, force) + moment]) + others).sum(axis=0)
         self._steps += len(steps)
         self._carried_steps += len(steps)
-        geoms, depths, positions, frames, friction, pressing = map(
-            np.concatenate, zip(*(s[5:] for s in steps))
-        )
+        points = map(np.concatenate, zip(*(step[5:] for step in steps), strict=True))
+        geoms, depths, positions, frames, friction, pressing = points
         first, second = geoms.T
         carries = (self._is_segment[first] != self._is_segment[second]) & (pressing > 0.0)
         carries &= ~self._leaning[first, second]
