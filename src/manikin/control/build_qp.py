@@ -228,8 +228,8 @@ def joint_acceleration_bounds(
     half_square = 0.5 * horizon**2
     least = usual + np.maximum((lower - angle) / half_square, (-speed_limit - speed) / horizon)
     greatest = usual + np.minimum((upper - angle) / half_square, (speed_limit - speed) / horizon)
-    least = np.clip(least, -largest, 0.9 * largest)
-    return least, np.maximum(np.clip(greatest, -0.9 * largest, largest), least)
+    least = np.minimum(np.maximum(least, -largest), 0.9 * largest)
+    return least, np.maximum(np.minimum(np.maximum(greatest, -0.9 * largest), largest), least)
 
 
 def _cost(

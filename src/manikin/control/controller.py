@@ -179,12 +179,9 @@ class Controller:
     ) -> ControlProblem:  # fmt: skip
         """Build the program of one step, without solving it; wished forces are those of the time [s]."""
         settings = self.settings
-        on = [support for support in supports.values() if support.mode is SupportMode.STANCE]
-        loaded = [self._wishing(self._loaded(s, s.contact, state), time) for s in on if s.contact is not None]
-        loaded = [self._planned(one, reference) for one in loaded]
-        kinds = {one.basis.contact.kind for one in loaded}
-        if self.body.stature is not None and kinds == {ContactKind.POINT}:
-            loaded = [replace(one, least=self._least(supports, one)) for one in loaded]
+        on = [(s, s.contact) for s in supports.values() if s.mode is SupportMode.STANCE and s.contact]
+        pressed = self.body.stature is not None and {c.kind for _, c in on} == {ContactKind.POINT}
+        loaded = [self._loaded(*one, state, reference, time, pressed=pressed) for one in on]
         horizon, largest = settings.joint_limit_horizon, settings.max_joint_acceleration
         bounds = JointBounds.of(self.body, state, horizon, largest, planned=reference)
         return build_qp(
@@ -267,79 +264,80 @@ class Controller:
         follow, point = 1.0 if landing else support.follow, name in self._points
         return swing_task(name, frame, target, gains.swing, weight, follow, point=point)
 
-    def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
-        frame = state.frames[contact.effector]
-        geometry = edge_forces.on_bar(contact, self.geometry(contact), self.body, frame)
-        basis = edge_forces.contact_force_basis(
-            contact, geometry, state, sliding=support.settling,
-            friction_share=self.settings.supports.friction_share, friction_model=self._friction_model,
-        )  # fmt: skip
-        edges = len(basis.upper) // geometry.point_count
+    def _loaded(
+        self, support: SupportState, contact: Contact, state: DynamicsState, reference: ReferenceSample,
+        time: float, *, pressed: bool,
+    ) -> LoadedContact:  # fmt: skip
+        """A contact with the limits and the forces that are wanted of it at a time [s].
+
+        What it is planned to carry counts where no other force is wished; ``pressed`` keeps it pressed from
+        its landing until it is about to leave.
+        """
+        name, share = contact.effector, min(support.load_share, support.unload_share)
+        geometry = edge_forces.on_bar(contact, self.geometry(contact), self.body, state.frames[name])
         cap = contact.normal_force_cap or self.settings.supports.default_cap * state.mass * GRAVITY
         cap *= support.load_share
         if support.unload_share < 1.0:
             cap = min(cap, support.unload_share * self._carried.get(support.effector, cap))
-        upper = basis.upper
+        basis = edge_forces.contact_force_basis(
+            contact, geometry, state, sliding=support.settling,
+            friction_share=self.settings.supports.friction_share, friction_model=self._friction_model,
+        )  # fmt: skip
+        if (upper := self._point_caps(support, contact, state, geometry, cap)) is not None:
+            basis = replace(basis, upper=np.repeat(upper, len(basis.upper) // geometry.point_count))
+        carries = pressed and support.planned and support.unload_share >= 1.0
+        least = min(PRESSED * self.body.mass * GRAVITY, cap) if carries else 0.0
+        wish = self._wishes.get(name)
+        if wish is not None and time >= wish.start:
+            return LoadedContact(basis, cap, share, wish.at(time), wish.weight, least)
+        planned, weight = reference.wrenches.get(name), self.settings.weights.planned_force
+        return LoadedContact(basis, cap, share, least=least, planned=planned, planned_weight=weight)
+
+    def _point_caps(
+        self, support: SupportState, contact: Contact, state: DynamicsState, geometry: ContactGeometry,
+        cap: float,
+    ) -> FloatArray | None:  # fmt: skip
+        """(k,) largest value of the force variables of each point [N]; None without any."""
+        upper = None
         if support.settling:
-            upper = np.minimum(upper, cap * self._low_shares(geometry, contact, state, edges))
+            upper = cap * self._low_shares(geometry, contact, state)
         elif self.settings.watch_toes and _lies_flat(support) and len(geometry.patches) > 1:
-            upper = np.minimum(upper, cap * self._toe_shares(geometry, contact, state, edges))
+            upper = cap * self._toe_shares(geometry, contact, state)
         if support.fades:
-            upper = np.minimum(upper, state.mass * GRAVITY * self._point_shares(support, contact, edges))
-        return LoadedContact(replace(basis, upper=upper), cap, min(support.load_share, support.unload_share))
-
-    def _least(self, supports: Mapping[str, SupportState], loaded: LoadedContact) -> float:
-        """Normal force that keeps a contact pressed which has landed and is not about to leave [N]."""
-        support = supports[loaded.basis.contact.effector]
-        carries = support.planned and support.unload_share >= 1.0
-        return min(PRESSED * self.body.mass * GRAVITY, loaded.cap) if carries else 0.0
-
-    def _planned(self, loaded: LoadedContact, reference: ReferenceSample) -> LoadedContact:
-        """The contact with its planned wrench, where that is known and no other force is wished."""
-        wrench = reference.wrenches.get(loaded.basis.contact.effector)
-        if wrench is None or loaded.wished is not None:
-            return loaded
-        return replace(loaded, planned=wrench, planned_weight=self.settings.weights.planned_force)
-
-    def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:
-        """The contact with the force that it should feel at a time, where there is one."""
-        wish = self._wishes.get(loaded.basis.contact.effector)
-        if wish is None or time < wish.start:
-            return loaded
-        return replace(loaded, wished=wish.at(time), wish_weight=wish.weight)
+            fading = state.mass * GRAVITY * self._fading_shares(support, contact)
+            upper = fading if upper is None else np.minimum(upper, fading)
+        return upper
 
     @staticmethod
     def _low_shares(
-        geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int, raised: float = RAISED
+        geometry: ContactGeometry, contact: Contact, state: DynamicsState, raised: float = RAISED
     ) -> FloatArray:
-        """(e k,) share of the load that each point may carry: those ``raised`` by a tilt [m] carry none."""
+        """(k,) share of the load that each point may carry: those ``raised`` by a tilt [m] carry none."""
         patches = [(state.frames[segment_key(segment)], points) for segment, points in geometry.patches]
         places = ((frame.position + points @ frame.rotation.T) @ contact.normal for frame, points in patches)
         height = np.concatenate(list(places))
-        return np.repeat(np.clip(2.0 - (height - height.min()) / raised, 0.0, 1.0), edges)
+        return np.clip(2.0 - (height - height.min()) / raised, 0.0, 1.0)
 
     @classmethod
-    def _toe_shares(
-        cls, geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int
-    ) -> FloatArray:
-        """(e k,) shares of the load as of :meth:`_low_shares` of the tips of toes.
+    def _toe_shares(cls, geometry: ContactGeometry, contact: Contact, state: DynamicsState) -> FloatArray:
+        """(k,) shares of the load as of :meth:`_low_shares` of the tips of toes.
 
         Toes are light: those that bounce off as a foot lands would be thrown back by the torque for a load
         that they do not carry. What is behind their hinge keeps its share.
         """
-        shares = cls._low_shares(geometry, contact, state, edges, RAISED_TOES)
-        shares[: edges * len(geometry.patches[0][1])] = 1.0
+        shares = cls._low_shares(geometry, contact, state, RAISED_TOES)
+        shares[: len(geometry.patches[0][1])] = 1.0
         return shares
 
-    def _point_shares(self, support: SupportState, contact: Contact, edges: int) -> FloatArray:
-        """(e k,) body weights that each point's variables may carry while the touching part changes."""
+    def _fading_shares(self, support: SupportState, contact: Contact) -> FloatArray:
+        """(k,) body weights that each point's variables may carry while the touching part changes."""
         along = self._along[_touching_points(contact)]
         shares = np.full(len(along), np.inf)
         for part, share in support.fades:
             if part is not SolePart.FULL:  # a heel is what lies behind the middle of its sole
                 beyond = along >= 0 if part is SolePart.HEEL else along <= 0
                 shares[beyond] = np.minimum(shares[beyond], share)
-        return np.repeat(shares, edges)
+        return shares
 
     def _solve(self, problem: ControlProblem) -> tuple[QPSolution | None, str]:
         solution = self._solver.solve(problem.program)

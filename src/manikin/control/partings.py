@@ -96,7 +96,8 @@ class SelfWatch:
             return []
         model, data = self._model, self._data
         pin.updateGeometryPlacements(model, data, self._shapes, self._placed, state.q)
-        gaps = np.array([self._distance(self._placed, index) for index in due])
+        shapes, placed = self._shapes, self._placed
+        gaps = np.array([pin.computeDistance(shapes, placed, index).min_distance for index in due])
         wait = (gaps - NEAR) / (FASTEST * period)
         # By how it changed, and a fifth more as it may have quickened: the rate itself takes longer.
         rates, room = 1.2 * (gaps - self._gaps[due]) / period, gaps - self._kept[due]
@@ -114,9 +115,6 @@ class SelfWatch:
         least = least_parting(self._gaps[index] - self._kept[index], rate, horizon)
         return Parting((self._names[pair.first], self._names[pair.second]), gradient, least - drift)
 
-    def _distance(self, placed: Any, index: int) -> float:
-        return float(pin.computeDistance(self._shapes, placed, index).min_distance)
-
     def _planned_gap(self, reference: ReferenceSample, index: int) -> float:
         """Planned distance of a pair [m]."""
         pair, model, data = self._shapes.collisionPairs[index], self._model, self._planned_data
@@ -124,7 +122,7 @@ class SelfWatch:
         for shape in (pair.first, pair.second):
             item = self._shapes.geometryObjects[shape]
             self._planned.oMg[shape] = data.oMi[item.parentJoint] * item.placement
-        return self._distance(self._planned, index)
+        return float(pin.computeDistance(self._shapes, self._planned, index).min_distance)
 
     def _derivatives(self, index: int) -> tuple[FloatArray, float]:
         """Gradient (nv,) of a distance, and its second derivative without that of the joints [m/s^2].

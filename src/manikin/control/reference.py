@@ -70,15 +70,19 @@ class ReferenceSample:
             angular_momentum=rate * self.angular_momentum, effectors=effectors,
         )  # fmt: skip
 
-    def until(self, end: "ReferenceSample", period: float) -> "ReferenceSample":
+    def until(
+        self, end: "ReferenceSample", period: float, later: tuple[FloatArray, FloatArray],
+        wrenches: Mapping[str, FloatArray],
+    ) -> "ReferenceSample":  # fmt: skip
         """The same state with the mean accelerations over the time [s] until another one."""
-        later = end.effectors
-        return replace(
-            self, a=(end.v - self.v) / period,
-            com_acceleration=(end.com_velocity - self.com_velocity) / period,
-            angular_momentum_rate=(end.angular_momentum - self.angular_momentum) / period,
-            effectors={name: replace(frame, acceleration=(later[name].twist - frame.twist) / period)
-                       for name, frame in self.effectors.items()},
+        pairs = zip(self.effectors.items(), end.effectors.values(), strict=True)
+        return ReferenceSample(
+            self.q, self.v, (end.v - self.v) / period,
+            self.com, self.com_velocity, (end.com_velocity - self.com_velocity) / period,
+            self.angular_momentum, (end.angular_momentum - self.angular_momentum) / period,
+            {name: EffectorReference(now.rotation, now.position, now.twist, (then.twist - now.twist) / period)
+             for (name, now), then in pairs},
+            later, wrenches,
         )  # fmt: skip
 
 
@@ -124,13 +128,13 @@ class Reference:
         if rate != 1.0 or next_rate != 1.0:
             now, then = now.slowed(rate), then.slowed(next_rate)
         q, v, _ = self._state(time + next_rate * self._horizon)
-        hold, later = now.until(then, self._period), (q[7:], next_rate * v[6:])
-        return replace(hold, later=later, wrenches=self._wrenches(time + 0.5 * next_rate * self._period))
+        wrenches = self._wrenches(time + 0.5 * next_rate * self._period)
+        return now.until(then, self._period, (q[7:], next_rate * v[6:]), wrenches)
 
     def _wrenches(self, time: float) -> Mapping[str, FloatArray]:
         """Planned wrench of each contact at the next sample, if any of them carries."""
         motion = self.motion
-        planned = motion.contact_force[min(int(np.searchsorted(motion.time, time)), len(motion.time) - 1)]
+        planned = motion.contact_force[min(int(motion.time.searchsorted(time)), len(motion.time) - 1)]
         return dict(zip(motion.contact_names, planned, strict=True)) if planned.any() else {}
 
     def _rates(self, time: float) -> ReferenceSample:
@@ -150,7 +154,7 @@ class Reference:
         if not motion.time[0] - 1e-9 <= time <= motion.time[-1] + 1e-9:
             end = 0 if time < motion.time[0] else -1
             return motion.q[end], self._rest, motion.com[end]
-        after = min(int(np.searchsorted(motion.time, time - 1e-9)), len(motion.time) - 1)
+        after = min(int(motion.time.searchsorted(time - 1e-9)), len(motion.time) - 1)
         if after == 0 or abs(motion.time[after] - time) < 1e-9:
             return motion.q[after], motion.v[after], motion.com[after]
         before = after - 1

@@ -248,6 +248,8 @@ class SupportSwitch:
 
     def _fades(self, interval: SupportInterval, time: float) -> tuple[tuple[SolePart, float], ...]:
         """Load moves gradually to points that begin to touch, and off those that cease to."""
+        if len(interval.parts) == 1:
+            return ()
         fades, settings = [], self._settings
         if (before := interval.part_before(time)) is not None:
             share = (time - before[1]) / settings.rolling_load_time

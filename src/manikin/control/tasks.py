@@ -76,7 +76,7 @@ def com_task(
     error, rate = reference.com - state.com, reference.com_velocity - state.momentum[:3] / state.mass
     wanted = reference.com_acceleration + gains.stiffness * error + gains.damping * rate
     matrix = state.centroidal_map[:3] / state.mass
-    return AccelerationTask("com", matrix, wanted - state.momentum_drift[:3] / state.mass, np.full(3, weight))
+    return AccelerationTask("com", matrix, wanted - state.momentum_drift[:3] / state.mass, _even(weight, 3))
 
 
 def angular_momentum_task(
@@ -85,7 +85,7 @@ def angular_momentum_task(
     """Follow the angular momentum about the centre of mass; only ``gains.damping`` acts."""
     error, rows = reference.angular_momentum - state.momentum[3:], state.centroidal_map[3:]
     target = reference.angular_momentum_rate + gains.damping * error - state.momentum_drift[3:]
-    return AccelerationTask("angular_momentum", rows, target, np.full(3, weight))
+    return AccelerationTask("angular_momentum", rows, target, _even(weight, 3))
 
 
 def orientation_task(
@@ -94,7 +94,7 @@ def orientation_task(
     """Follow the orientation of a frame ("Basin" of [Qiu2012]_ Table 6.1)."""
     error, rate = orientation_error(reference.rotation, frame.rotation), reference.twist[3:] - frame.twist[3:]
     wanted = reference.acceleration[3:] + gains.stiffness * error + gains.damping * rate
-    return AccelerationTask(name, frame.jacobian[3:], wanted - frame.drift[3:], np.full(3, weight))
+    return AccelerationTask(name, frame.jacobian[3:], wanted - frame.drift[3:], _even(weight, 3))
 
 
 def swing_task(
@@ -109,7 +109,7 @@ def swing_task(
     error, rate = np.concatenate((reference.position - frame.position, turn)), reference.twist - frame.twist
     wanted = reference.acceleration + follow * gains.stiffness * error + follow * gains.damping * rate
     rows = 3 if point else 6
-    return AccelerationTask(name, frame.jacobian[:rows], (wanted - frame.drift)[:rows], np.full(rows, weight))
+    return AccelerationTask(name, frame.jacobian[:rows], (wanted - frame.drift)[:rows], _even(weight, rows))
 
 
 def lifted(reference: EffectorReference, support: SupportState) -> EffectorReference:
@@ -142,7 +142,7 @@ def rolling_task(
     if support.planned:
         wanted = reference.acceleration + gains.damping * (reference.twist - frame.twist)
         wanted[3:] += gains.stiffness * orientation_error(reference.rotation, frame.rotation)
-    return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
+    return AccelerationTask(name, frame.jacobian, wanted - frame.drift, _even(weight, 6))
 
 
 def stance_task(
@@ -158,7 +158,7 @@ def stance_task(
     if contact is not None:
         wanted[3:] += gains.stiffness * (skew(frame.rotation[:, 2]) @ contact.normal)
     rows = 3 if contact is not None and contact.kind is ContactKind.POINT else 6
-    return AccelerationTask(name, frame.jacobian[:rows], (wanted - frame.drift)[:rows], np.full(rows, weight))
+    return AccelerationTask(name, frame.jacobian[:rows], (wanted - frame.drift)[:rows], _even(weight, rows))
 
 
 def posture_task(
@@ -170,7 +170,13 @@ def posture_task(
     error, rate = reference.q[7:] - state.q[7:], reference.v[6:] - state.v[6:]
     wanted = reference.a[6:] + gains.stiffness * error + gains.damping * rate
     jacobian = _joint_rows(tuple(rows), len(state.v))
-    return AccelerationTask(name, jacobian, wanted[rows], np.full(len(rows), weight))
+    return AccelerationTask(name, jacobian, wanted[rows], _even(weight, len(rows)))
+
+
+@lru_cache(maxsize=64)
+def _even(weight: float, rows: int) -> FloatArray:
+    """(rows,) the same weight of each row of a task; read-only."""
+    return frozen_array(np.full(rows, weight), "weights of rows")
 
 
 @lru_cache(maxsize=64)
