@@ -180,10 +180,10 @@ class Contact(Displayed):
         size = np.abs(self.points)
         return len(size) != 4 or bool(np.abs(size - size[0]).max() > 1e-12)
 
-    @property
+    @cached_property
     def outline(self) -> FloatArray:
         """(k, 2) hull of the points in the contact frame, counter-clockwise [m]."""
-        return convex_polygon(self.points[:, :2])
+        return frozen_array(convex_polygon(self.points[:, :2]), "outline [m]")
 
     def toe_outline(self, hinge: float) -> FloatArray:
         """(k, 2) part of the outline before the hinge of the toes, which crosses the x axis there [m]."""

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 
 from manikin.balance.motion_margin import MotionMargin, motion_margin
 from manikin.contact import Contact, ContactKind, ContactModel, SolePart, Stance
-from manikin.numerics.polytope import convex_polygon, signed_distance
+from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import FloatArray, cross, rotation_from_normal
 
 PRESSES = 1.0 / 75.0
@@ -210,15 +210,15 @@ def _same_place(first: Contact, second: Contact) -> bool:
     alike &= first.torsion_limit == second.torsion_limit
     if not alike or first.normal @ second.normal < 1.0 - 1e-6:
         return False
-    one, other = ((c.points_in_world - first.position) @ first.rotation_contact_to_world
-                  for c in (first, second))  # fmt: skip
-    if np.abs(np.concatenate([one[:, 2], other[:, 2]])).max() > TOUCHING:
+    one, rotation = first.points, first.rotation_contact_to_world
+    other = (second.points_in_world - first.position) @ rotation
+    if max(np.abs(one[:, 2]).max(), np.abs(other[:, 2]).max()) > TOUCHING:
         return False
     if len(one) == len(other) and np.square(one - other).sum(axis=1).max() <= TOUCHING**2:
         return True  # point by point, as from one sample to the next
-    if np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1).max() > TOUCHING:
+    if np.square(one[:, None, :2] - other[:, :2]).sum(axis=2).min(axis=1).max() > TOUCHING**2:
         return False
-    return bool(signed_distance(other[:, :2], convex_polygon(one[:, :2])).min() >= -TOUCHING)
+    return bool(signed_distance(other[:, :2], first.outline).min() >= -TOUCHING)
 
 
 def _touched(

@@ -1,5 +1,6 @@
 """Execute a planned motion: the controller drives the body in the physics engine."""
 
+import math
 import time as clock
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -21,7 +22,7 @@ from manikin.scene import Proximity, Scene
 from manikin.simulation.compile import PhysicsOptions, compile_model, is_narrow
 from manikin.simulation.execution import Execution, push_outcome
 from manikin.simulation.push_force import Push
-from manikin.simulation.recorder import SWITCHING, Recorder, near
+from manikin.simulation.recorder import ROUNDING, SWITCHING, Recorder
 from manikin.simulation.uncertainty import TrueWorld
 from manikin.simulation.world import Grip, World
 
@@ -165,6 +166,9 @@ class _Run:
         self.failure, self.failure_time = "", None
         self._leaning = [(tuple(segment.name for segment in body.segments), name) for name in padded]
         self._planned_now: tuple[int, ...] | None = None
+        self._expected = [_expected(hold.interval) for hold in self.holds]
+        every = (hold.interval for hold in self.holds)
+        self._grasps = [item for item in every if item.contact.kind is ContactKind.GRASP]
         self._leaving = set[str]()
         self._hand_mass = cache(self.world.least_mass)
 
@@ -231,12 +235,13 @@ class _Run:
     def _switch(self, time: float) -> None:
         """Set the touches planned at a time of the plan, and hold on to grasps."""
         self.world.carry(self.controller.carried_at(time))
-        now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
+        now = tuple(k for k, (start, end) in enumerate(self._expected) if start <= time <= end)
         if now != self._planned_now:
             planned = [(self.holds[i].lying, name) for i in now for name in self.holds[i].obstacles]
             self.world.plan_touches(planned, self._leaning)
             self._planned_now = now
-        grasps = [item.interval for item in self.holds if item.interval.contact.kind is ContactKind.GRASP]
+        if not (grasps := self._grasps):
+            return
         held = {item.contact.effector: item.contact for item in grasps if item.start <= time < item.end}
         left = {item.contact.effector for item in grasps if item.end <= time < item.end + GRASPING}
         leaving = left - held.keys()
@@ -267,8 +272,8 @@ class _Run:
 
     def _failed(self, output: ControlOutput) -> bool:
         time, state = self.world.time, output.state
-        offset = float(np.linalg.norm(state.com - output.reference.com))
-        if self.world.divergence or not np.all(np.isfinite(state.com)):
+        offset = math.dist(state.com, output.reference.com)
+        if self.world.divergence or not math.isfinite(offset):
             self.failure = f"the simulation diverged ({self.world.divergence}) at {time:.3f} s"
         elif offset > FALL_DISTANCE:
             self.failure = f"fell: the CoM is {offset:.2f} m from its plan at {time:.3f} s"
@@ -314,8 +319,8 @@ def _crossed(scene: Scene, schedule: ContactSchedule) -> tuple[str, ...]:
     return tuple(item.name for item in scene if item.name in touched and is_narrow(item))
 
 
-def _expected(interval: SupportInterval, time: float) -> bool:
-    """Whether a touch is planned; a hand may brush along what it is about to grasp or has let go."""
+def _expected(interval: SupportInterval) -> tuple[float, float]:
+    """When a touch is planned [s]; a hand may brush along what it is about to grasp or has let go."""
     if interval.contact.kind is not ContactKind.GRASP:
-        return near(interval, time)
-    return interval.start - GRASPING <= time <= interval.end + GRASPING
+        return interval.early - ROUNDING, interval.late + ROUNDING
+    return interval.start - GRASPING, interval.end + GRASPING

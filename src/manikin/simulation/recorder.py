@@ -17,6 +17,9 @@ from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.simulation.carrying import PRESSES, CarriedPoints, CarryingContacts, Sensed, carried_margin
 
+ROUNDING = 1e-9
+"""Of times [s]."""
+
 SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""
 
@@ -241,4 +244,4 @@ def _lengths(vectors: list[FloatArray]) -> FloatArray:
 
 def near(interval: SupportInterval, time: float) -> bool:
     """Whether a support is planned at ``time`` [s] or has just been, or is about to be."""
-    return interval.early - 1e-9 <= time <= interval.late + 1e-9
+    return interval.early - ROUNDING <= time <= interval.late + ROUNDING

@@ -57,6 +57,13 @@ class Grip:
         return cls(effector, position, max_force, mass / time**2, 2.0 * mass / time)
 
 
+_FATAL = {
+    kind: int(getattr(mujoco.mjtWarning, f"mjWARN_{kind}"))
+    for kind in ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
+}
+"""Warnings of the engine after which its state means nothing."""
+
+
 class _EngineStep(NamedTuple):
     """What is kept of one engine step of k contact points until it is looked at; all of its beginning.
 
@@ -71,7 +78,8 @@ class _EngineStep(NamedTuple):
         positions: (k, 3) [m].
         frames: (k, 9) contact frames, whose first axis goes from the first geometry to the second.
         friction: (k, 5) coefficients.
-        forces: (k,) normal forces [N].
+        rows: (k,) first constraint of each point; negative without one.
+        forces: (k,) its normal force, if it has one [N].
     """
 
     time: float
@@ -84,6 +92,7 @@ class _EngineStep(NamedTuple):
     positions: FloatArray
     frames: FloatArray
     friction: FloatArray
+    rows: NDArray[np.int32]
     forces: FloatArray
 
 
@@ -256,15 +265,12 @@ class World:
         A point counts as often as it was met, each time with its force over the number of engine steps.
         """
         self._measure()
-        none = (np.zeros((0, 2), dtype=np.int32), *map(np.zeros, ((0, 3), (0, 3), 0, 0)))
-        geoms, positions, normals, forces, friction = map(
-            np.concatenate, zip(none, *self._carried, strict=True)
-        )
-        steps, self._carried, self._carried_steps = max(self._carried_steps, 1), [], 0
-        second = self._is_segment[geoms[:, 1]]
-        own, other = np.where(second, geoms[:, ::-1].T, geoms.T)
-        # The engine's normal goes from the first geometry to the second.
-        normals = np.where(second, 1.0, -1.0)[:, None] * normals
+        parts, steps = self._carried, max(self._carried_steps, 1)
+        self._carried, self._carried_steps = [], 0
+        if len(parts) != 1:
+            none = (np.zeros(0, np.int32), np.zeros(0, np.int32), *map(np.zeros, ((0, 3), (0, 3), 0, 0)))
+            parts = [tuple(map(np.concatenate, zip(none, *parts, strict=True)))]
+        own, other, positions, normals, forces, friction = parts[0]
         names, others = (tuple(self._names[side].tolist()) for side in (own, other))
         return CarriedPoints(names, others, positions, normals, forces / steps, friction)
 
@@ -286,13 +292,11 @@ class World:
         others = -self._leaning_wrench() if self._leans else np.zeros(6)
         for pull, position in self._grip_forces.values():
             others += np.concatenate((pull, cross(position, pull)))
-        geoms, first = contact.geom.copy(), contact.efc_address
-        forces = np.zeros(len(first))
-        if data.nefc:
-            forces = np.where(first >= 0, data.efc_force[np.maximum(first, 0)], 0.0)
+        rows = contact.efc_address.copy()
         return _EngineStep(
-            time, qpos[:3], data.xmat[self._root].copy(), data.qfrc_constraint[:6].copy(), others, geoms,
-            -contact.dist, contact.pos.copy(), contact.frame.copy(), contact.friction.copy(), forces,
+            time, qpos[:3], data.xmat[self._root].copy(), data.qfrc_constraint[:6].copy(), others,
+            contact.geom.copy(), -contact.dist, contact.pos.copy(), contact.frame.copy(),
+            contact.friction.copy(), rows, data.efc_force[rows] if data.nefc else np.zeros(len(rows)),
         )  # fmt: skip
 
     def _measure(self) -> None:
@@ -307,12 +311,19 @@ class World:
         self._steps += len(steps)
         self._carried_steps += len(steps)
         points = map(np.concatenate, zip(*(step[5:] for step in steps), strict=True))
-        geoms, depths, positions, frames, friction, pressing = points
+        geoms, depths, positions, frames, friction, rows, pressing = points
+        pressing[rows < 0] = 0.0
         first, second = geoms.T
-        carries = (self._is_segment[first] != self._is_segment[second]) & (pressing > 0.0)
-        carries &= ~self._leaning[first, second]
+        ours = self._is_segment[second]
+        carries = np.flatnonzero((self._is_segment[first] != ours) & (pressing > 0.0))
+        if self._leans:
+            carries = carries[~self._leaning[first[carries], second[carries]]]
+        ours = ours[carries]
+        own, other = np.where(ours, geoms[carries, ::-1].T, geoms[carries].T)
+        # The engine's normal goes from the first geometry to the second.
+        normals = np.where(ours, 1.0, -1.0)[:, None] * frames[carries, :3]
         self._carried.append((
-            geoms[carries], positions[carries], frames[carries, :3], pressing[carries], friction[carries, 0],
+            own, other, positions[carries], normals, pressing[carries], friction[carries, 0],
         ))  # fmt: skip
         unplanned = np.flatnonzero(~self._planned[first, second])
         if len(unplanned):
@@ -426,6 +437,5 @@ class World:
     @property
     def divergence(self) -> str:
         """Fatal warning of the engine, such as ``"BADQACC"``; empty without one."""
-        kinds, number = ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL"), mujoco.mjtWarning
-        told = (kind for kind in kinds if self._data.warning[getattr(number, f"mjWARN_{kind}")].number)
-        return next(told, "")
+        warnings = self._data.warning
+        return next((kind for kind, number in _FATAL.items() if warnings[number].number), "")
