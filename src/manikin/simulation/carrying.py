@@ -8,7 +8,7 @@ count too. So the measured wrench lies in the wrench polytope of the stance, up 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +99,38 @@ class Sensed:
         return np.concatenate((force, cross(position - about, force)))
 
 
+class EngineStep(NamedTuple):
+    """What is kept of one engine step with k contact points until it is looked at; all of its beginning.
+
+    Attributes:
+        time: [s].
+        root: (3,) position of the root [m].
+        rotation: (9,) matrix from the root's axes to the world's.
+        force: (6,) generalised force of all contacts on the root: in world axes [N], in its own [N.m].
+        others: (6,) wrench of grips, less that of contacts on which the body only leans [N, N.m].
+        geoms: (k, 2) geometries of the engine.
+        depths: (k,) penetration [m].
+        positions: (k, 3) [m].
+        normals: (k, 3) from the first geometry to the second.
+        friction: (k,) coefficient.
+        rows: (k,) constraint of each point; negative without one, and where the body only leans.
+        pressing: (k,) normal force, where it has one [N].
+    """
+
+    time: float
+    root: FloatArray
+    rotation: FloatArray
+    force: FloatArray
+    others: FloatArray
+    geoms: NDArray[np.int32]
+    depths: FloatArray
+    positions: FloatArray
+    normals: FloatArray
+    friction: FloatArray
+    rows: NDArray[np.int32]
+    pressing: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class CarriedPoints:
     """Contact points of body and scene that carried force during a control step.
@@ -118,6 +150,11 @@ class CarriedPoints:
     normals: FloatArray
     forces: FloatArray
     friction: FloatArray
+
+    @classmethod
+    def none(cls) -> "CarriedPoints":
+        """No points."""
+        return cls((), (), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 
     def of(self, segments: Sequence[str]) -> NDArray[np.bool_]:
         """(k,) whether each point is on one of the segments."""

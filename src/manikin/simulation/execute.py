@@ -194,9 +194,9 @@ class _Run:
             self._advance(output.tau, 1)
             sensed = self.world.sense()
             self._advance(output.tau, self.substeps - 1)
-            carried = self.world.carried()
+            steps = self.world.take()
             if number >= 0:
-                self.recorder.record(sensed, output, self.world.mean_wrench(), carried)
+                self.recorder.record(sensed, output, steps)
                 if self._failed(output):
                     break
             number += 1
@@ -288,7 +288,7 @@ class _Run:
         touches = tuple(t for t in world.touches if t.time < pushed or t.other not in segments)
         if not self.failure and touches:
             self.failure, self.failure_time = f"unplanned touch: {touches[0]}", touches[0].time
-        balance = recorder.margins(self.body.mass)
+        balance = recorder.margins(self.body.mass, world)
         executed = recorder.motion(self.body.joint_names, balance.margin)
         com = recorder.com_errors()
         bound = com[: max(recorder.bound_samples(), 1)]

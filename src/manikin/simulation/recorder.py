@@ -15,7 +15,15 @@ from manikin.control.supports import SupportInterval, SupportState, support_inte
 from manikin.motion import Motion
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import FloatArray, cross
-from manikin.simulation.carrying import PRESSES, CarriedPoints, CarryingContacts, Sensed, carried_margin
+from manikin.simulation.carrying import (
+    PRESSES,
+    CarriedPoints,
+    CarryingContacts,
+    EngineStep,
+    Sensed,
+    carried_margin,
+)
+from manikin.simulation.world import World
 
 ROUNDING = 1e-9
 """Of times [s]."""
@@ -32,15 +40,13 @@ class Sample:
         sensed: Contact forces and acceleration at the beginning of the step.
         output: Decision of the controller there.
         planned: Contact that each effector has, or in flight the one to come or else the last.
-        total: (6,) mean over the step of the wrench of all contacts about the world origin.
-        carried: Contact points that carried it.
+        steps: Its engine steps.
     """
 
     sensed: Sensed
     output: ControlOutput
     planned: Mapping[str, Contact]
-    total: FloatArray
-    carried: CarriedPoints
+    steps: tuple[EngineStep, ...]
 
     @property
     def plan_time(self) -> float:
@@ -59,10 +65,10 @@ class Recorder:
         self.samples: list[Sample] = []
         self._intervals = {name: support_intervals(schedule, name, SWITCHING) for name in self.effectors}
 
-    def record(self, sensed: Sensed, output: ControlOutput, mean: FloatArray, carried: CarriedPoints) -> None:
-        """Add one control step: its first engine step, and the mean wrench (6,) of all its points."""
+    def record(self, sensed: Sensed, output: ControlOutput, steps: tuple[EngineStep, ...]) -> None:
+        """Add one control step: what is sensed at its beginning, its decision and its engine steps."""
         planned = {name: self._nearest_contact(name, sensed.time - output.waited) for name in self.effectors}
-        self.samples.append(Sample(sensed, output, planned, mean, carried))
+        self.samples.append(Sample(sensed, output, planned, steps))
 
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""
@@ -160,21 +166,22 @@ class Recorder:
         late = waited[np.minimum(np.searchsorted(planned, instants), len(waited) - 1)]
         return ContactSchedule(self._schedule.sequence, instants + late)
 
-    def margins(self, mass: float) -> MotionMargin:
+    def margins(self, mass: float, world: World) -> MotionMargin:
         """Margins of the mean measured wrenches about the centre of mass, in the stances that really carry.
 
         See :mod:`manikin.simulation.carrying`: a late foot does not count, and one that is early does. The
-        mass [kg] closes the polytope of a stance without force limits.
+        mass [kg] closes the polytope of a stance without force limits; the world is that of the steps.
         """
         carrying = CarryingContacts(self._segments, mass)
-        stances = [self._carrying_stance(carrying, sample) for sample in self.samples]
-        wrenches, com = [s.total for s in self.samples], [s.output.state.com for s in self.samples]
-        return carried_margin(stances, np.array(wrenches), np.array(com))
+        wrenches, carried = world.loads([sample.steps for sample in self.samples])
+        pairs = zip(self.samples, carried, strict=True)
+        stances = [self._carrying_stance(carrying, *pair) for pair in pairs]
+        return carried_margin(stances, wrenches, np.array([s.output.state.com for s in self.samples]))
 
-    def _carrying_stance(self, carrying: CarryingContacts, sample: Sample) -> Stance:
+    def _carrying_stance(self, carrying: CarryingContacts, sample: Sample, points: CarriedPoints) -> Stance:
         frames = sample.output.state.frames
         return carrying.stance(
-            sample.carried, lambda name: (frames[name].position, frames[name].rotation), sample.planned,
+            points, lambda name: (frames[name].position, frames[name].rotation), sample.planned,
             [name for name in self.effectors if name in sample.sensed.grips],
             self._schedule.stance_at(sample.plan_time).model,
         )  # fmt: skip

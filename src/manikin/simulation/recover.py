@@ -164,7 +164,7 @@ class _RecoveryRun:
             self.world.advance(output.tau, 1)
             sensed = self.world.sense()
             self.world.advance(output.tau, self.substeps - 1)
-            wrench, carried = self.world.mean_wrench(), self.world.carried()
+            (wrench,), (carried,) = self.world.loads([self.world.take()])
             if number >= 0:
                 self.recorder.add(time, output, sensed, wrench, carried, held=self.task.feet is Feet.HELD)
             fallen = self._fallen(output.state, lowest, time)

@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -12,9 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.body.strength import with_masses
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, cross
-from manikin.simulation.carrying import CarriedPoints, Sensed, Touch
+from manikin.simulation.carrying import CarriedPoints, EngineStep, Sensed, Touch
 from manikin.simulation.compile import SimulationModel, compile_model, obstacle_of
 from manikin.simulation.push_force import Push
+
+_WRENCH = ("root", "rotation", "force", "others")
+_POINTS = ("geoms", "positions", "normals", "friction", "rows", "pressing")
+"""What of engine steps makes wrenches, and the points that carried them."""
 
 _INERTIAL = (
     "body_mass", "body_ipos", "body_iquat", "body_inertia", "body_subtreemass", "body_invweight0", "dof_M0",
@@ -64,38 +68,6 @@ _FATAL = {
 """Warnings of the engine after which its state means nothing."""
 
 
-class _EngineStep(NamedTuple):
-    """What is kept of one engine step of k contact points until it is looked at; all of its beginning.
-
-    Attributes:
-        time: [s].
-        root: (3,) position of the root [m].
-        rotation: (9,) matrix from the root's axes to the world's.
-        force: (6,) generalised force of all contacts on the root: in world axes [N], in its own [N.m].
-        others: (6,) wrench of grips, less that of contacts on which the body only leans [N, N.m].
-        geoms: (k, 2) geometries.
-        depths: (k,) penetration [m].
-        positions: (k, 3) [m].
-        frames: (k, 9) contact frames, whose first axis goes from the first geometry to the second.
-        friction: (k, 5) coefficients.
-        rows: (k,) first constraint of each point; negative without one.
-        forces: (k,) its normal force, if it has one [N].
-    """
-
-    time: float
-    root: FloatArray
-    rotation: FloatArray
-    force: FloatArray
-    others: FloatArray
-    geoms: NDArray[np.int32]
-    depths: FloatArray
-    positions: FloatArray
-    frames: FloatArray
-    friction: FloatArray
-    rows: NDArray[np.int32]
-    forces: FloatArray
-
-
 class World:
     """The physics engine with a body in a scene; states go in and come out in Pinocchio's convention.
 
@@ -127,10 +99,8 @@ class World:
         self._grip_forces: dict[str, FloatArray] = {}
         self._touches: dict[tuple[str, str], Touch] = {}
         self._penetration, self._padding_compression = 0.0, 0.0
-        self._total, self._steps = np.zeros(6), 0
-        self._pending: list[_EngineStep] = []
-        self._carried: list[tuple[NDArray, ...]] = []
-        self._carried_steps = 0
+        self._unmeasured: list[EngineStep] = []
+        self._untaken: list[EngineStep] = []
         self._is_segment = np.array([segment for _, segment in self._owners], dtype=bool)
         self._names = np.array([name for name, _ in self._owners], dtype=object)
 
@@ -160,12 +130,10 @@ class World:
 
     def forget(self) -> None:
         """Forget unplanned touches, the deepest penetrations and the wrenches so far."""
-        self._pending.clear()
+        self._unmeasured.clear()
+        self._untaken.clear()
         self._touches.clear()
         self._penetration, self._padding_compression = 0.0, 0.0
-        self._total[:], self._steps = 0.0, 0
-        self._carried.clear()
-        self._carried_steps = 0
 
     def carry(self, masses: Mapping[str, float]) -> None:
         """Set the point masses that effectors carry, at rest in their frames [kg]; none sets all down."""
@@ -247,32 +215,61 @@ class World:
             self._before = (self._data.qpos.copy(), self._data.qvel.copy(), self.time)
             self._act()
             mujoco.mj_step(self._model, self._data)
-            self._pending.append(self._kept())
+            step = self._kept()
+            self._unmeasured.append(step)
+            self._untaken.append(step)
+
+    def take(self) -> tuple[EngineStep, ...]:
+        """The engine steps since the last call."""
+        taken, self._untaken = tuple(self._untaken), []
+        return taken
 
     def mean_wrench(self) -> FloatArray:
-        """(6,) mean wrench of scene and grips on the body since the last call, about the world origin.
-
-        Where the body only leans, nothing counts: it acts like a push. Impacts count by their share of time.
-        """
-        self._measure()
-        mean = self._total / max(self._steps, 1)
-        self._total[:], self._steps = 0.0, 0
-        return mean
+        """(6,) mean wrench of the engine steps that :meth:`take` would give, as of :meth:`loads`."""
+        return self.loads([self.take()])[0][0]
 
     def carried(self) -> CarriedPoints:
-        """Contact points of body and scene that carried force since the last call, but where it only leans.
+        """Contact points that carried force in the engine steps that :meth:`take` would give."""
+        return self.loads([self.take()])[1][0]
 
-        A point counts as often as it was met, each time with its force over the number of engine steps.
+    def loads(self, spans: Sequence[Sequence[EngineStep]]) -> tuple[FloatArray, list[CarriedPoints]]:
+        """What carried the body in n spans of engine steps.
+
+        Where it only leans, nothing counts: it acts like a push. Impacts count by their share of time.
+
+        Returns:
+            (n, 6) mean wrenches of scene and grips on the body about the world origin, and for each span the
+            contact points of body and scene that carried force: a point counts as often as it was met, each
+            time with its force over the number of engine steps.
         """
-        self._measure()
-        parts, steps = self._carried, max(self._carried_steps, 1)
-        self._carried, self._carried_steps = [], 0
-        if len(parts) != 1:
-            none = (np.zeros(0, np.int32), np.zeros(0, np.int32), *map(np.zeros, ((0, 3), (0, 3), 0, 0)))
-            parts = [tuple(map(np.concatenate, zip(none, *parts, strict=True)))]
-        own, other, positions, normals, forces, friction = parts[0]
-        names, others = (tuple(self._names[side].tolist()) for side in (own, other))
-        return CarriedPoints(names, others, positions, normals, forces / steps, friction)
+        steps, lengths = [step for span in spans for step in span], np.array([len(span) for span in spans])
+        wrenches, lengths = np.zeros((len(spans), 6)), np.maximum(lengths, 1)
+        if not steps:
+            return wrenches, [CarriedPoints.none() for _ in spans]
+        owner = np.repeat(np.arange(len(spans)), [len(span) for span in spans])
+        roots, turns, forces, others = (np.array([getattr(s, key) for s in steps]) for key in _WRENCH)
+        force, moment = forces[:, :3], np.einsum("sij,sj->si", turns.reshape(-1, 3, 3), forces[:, 3:])
+        # Inner forces cancel in the root.
+        np.add.at(wrenches, owner, np.hstack([force, cross(roots, force) + moment]) + others)
+        geoms, positions, normals, friction, rows, pressing = (
+            np.concatenate([getattr(step, key) for step in steps]) for key in _POINTS
+        )
+        span = np.repeat(owner, [len(step.geoms) for step in steps])
+        ours = self._is_segment[geoms]
+        carries = np.flatnonzero((ours[:, 0] != ours[:, 1]) & (rows >= 0) & (pressing > 0.0))
+        geoms, span, ours = geoms[carries], span[carries], ours[carries, 1]
+        # The engine's normal goes from the first geometry to the second.
+        normals = np.where(ours, 1.0, -1.0)[:, None] * normals[carries]
+        own, other = (self._names[side].tolist() for side in np.where(ours, geoms[:, ::-1].T, geoms.T))
+        positions, friction, pressing = positions[carries], friction[carries], pressing[carries]
+        pressing /= lengths[span]
+        ends = np.searchsorted(span, np.arange(len(spans) + 1)).tolist()
+        carried = [
+            CarriedPoints(tuple(own[a:b]), tuple(other[a:b]), positions[a:b], normals[a:b], pressing[a:b],
+                          friction[a:b])
+            for a, b in pairwise(ends)
+        ]  # fmt: skip
+        return wrenches / lengths[:, None], carried
 
     @property
     def penetration(self) -> float:
@@ -286,49 +283,36 @@ class World:
         self._measure()
         return self._padding_compression
 
-    def _kept(self) -> _EngineStep:
+    def _kept(self) -> EngineStep:
         """Copy of what was measured in the engine step that was just made."""
         data, contact, (qpos, _, time) = self._data, self._data.contact, self._before
-        others = -self._leaning_wrench() if self._leans else np.zeros(6)
+        geoms, rows, others = contact.geom.copy(), contact.efc_address.copy(), np.zeros(6)
         for pull, position in self._grip_forces.values():
             others += np.concatenate((pull, cross(position, pull)))
-        rows = contact.efc_address.copy()
-        return _EngineStep(
-            time, qpos[:3], data.xmat[self._root].copy(), data.qfrc_constraint[:6].copy(), others,
-            contact.geom.copy(), -contact.dist, contact.pos.copy(), contact.frame.copy(),
-            contact.friction.copy(), rows, data.efc_force[rows] if data.nefc else np.zeros(len(rows)),
+        forces = data.efc_force[rows] if data.nefc else np.zeros(len(rows))
+        if self._leans:
+            others -= self._leaning_wrench()
+            rows[self._leaning[geoms[:, 0], geoms[:, 1]]] = -1
+        return EngineStep(
+            time, qpos[:3], data.xmat[self._root].copy(), data.qfrc_constraint[:6].copy(), others, geoms,
+            -contact.dist, contact.pos.copy(), contact.frame[:, :3].copy(), contact.friction[:, 0].copy(),
+            rows, forces,
         )  # fmt: skip
 
     def _measure(self) -> None:
-        """Take the steps that were kept into the wrenches, touches and penetrations."""
-        steps, self._pending = self._pending, []
+        """Take the engine steps since the last call into the touches and penetrations."""
+        steps, self._unmeasured = self._unmeasured, []
         if not steps:
             return
-        times, roots, turns, forces, others = map(np.array, zip(*(step[:5] for step in steps), strict=True))
-        force, moment = forces[:, :3], np.einsum("sij,sj->si", turns.reshape(-1, 3, 3), forces[:, 3:])
-        # Inner forces cancel in the root.
-        self._total += (np.hstack([force, cross(roots, force) + moment]) + others).sum(axis=0)
-        self._steps += len(steps)
-        self._carried_steps += len(steps)
-        points = map(np.concatenate, zip(*(step[5:] for step in steps), strict=True))
-        geoms, depths, positions, frames, friction, rows, pressing = points
-        pressing[rows < 0] = 0.0
-        first, second = geoms.T
-        ours = self._is_segment[second]
-        carries = np.flatnonzero((self._is_segment[first] != ours) & (pressing > 0.0))
-        if self._leans:
-            carries = carries[~self._leaning[first[carries], second[carries]]]
-        ours = ours[carries]
-        own, other = np.where(ours, geoms[carries, ::-1].T, geoms[carries].T)
-        # The engine's normal goes from the first geometry to the second.
-        normals = np.where(ours, 1.0, -1.0)[:, None] * frames[carries, :3]
-        self._carried.append((
-            own, other, positions[carries], normals, pressing[carries], friction[carries, 0],
-        ))  # fmt: skip
-        unplanned = np.flatnonzero(~self._planned[first, second])
+        geoms, depths, rows, pressing = (
+            np.concatenate([getattr(step, key) for step in steps])
+            for key in ("geoms", "depths", "rows", "pressing")
+        )
+        unplanned = np.flatnonzero(~self._planned[geoms[:, 0], geoms[:, 1]])
         if len(unplanned):
-            number = np.repeat(np.arange(len(steps)), [len(step.geoms) for step in steps])
-            self._note_touches(times[number[unplanned]], geoms[unplanned], pressing[unplanned])
+            times = np.repeat([step.time for step in steps], [len(step.geoms) for step in steps])
+            forces = np.where(rows >= 0, pressing, 0.0)
+            self._note_touches(times[unplanned], geoms[unplanned], forces[unplanned])
         if self._pads:
             padded = self._padded[geoms].any(axis=1)
             deepest = float(depths[padded].max(initial=0.0))
