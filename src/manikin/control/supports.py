@@ -1,10 +1,12 @@
 """Which supports carry load at a time: planned switching, late and early touch-downs."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
@@ -104,22 +106,26 @@ class SupportInterval:
 
     def contact_at(self, time: float) -> Contact:
         """Part of the contact that is planned at a time [s]; before the first, the first."""
-        begun = [contact for start, contact in self.parts if start <= time + 1e-9]
-        return begun[-1] if begun else self.contact
+        return self.parts[self._part_at(time)][1]
+
+    def _part_at(self, time: float) -> int:
+        """Number of the part that is planned at a time [s]; before the first, the first."""
+        return max(bisect_right(self.parts, time + 1e-9, key=itemgetter(0)) - 1, 0)
 
     def part_before(self, time: float) -> tuple[SolePart, float] | None:
         """Part that touched before the one of a time [s], and when it changed; None without."""
-        now = self.contact_at(time).part
-        earlier = [(start, contact.part) for start, contact in self.parts if start <= time + 1e-9]
-        for (_, part), (changed, _) in zip(earlier[-2::-1], earlier[::-1], strict=False):
-            if part is not now:
-                return part, changed
+        number = self._part_at(time)
+        now = self.parts[number][1].part
+        for k in range(number, 0, -1):
+            if (part := self.parts[k - 1][1].part) is not now:
+                return part, self.parts[k][0]
         return None
 
     def part_after(self, time: float) -> tuple[SolePart, float] | None:
         """Part that touches after the one of a time [s], and when it changes; None without."""
-        now = self.contact_at(time).part
-        later = ((contact.part, start) for start, contact in self.parts if start > time + 1e-9)
+        number = self._part_at(time)
+        now = self.parts[number][1].part
+        later = ((contact.part, start) for start, contact in self.parts[number + 1 :])
         return next(((part, start) for part, start in later if part is not now), None)
 
 

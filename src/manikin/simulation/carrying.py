@@ -105,30 +105,37 @@ class EngineStep(NamedTuple):
     Attributes:
         time: [s].
         root: (3,) position of the root [m].
+        qvel: (nv,) velocity in the engine's convention.
+        qacc: (nv,) acceleration in the engine's convention.
         rotation: (9,) matrix from the root's axes to the world's.
         force: (6,) generalised force of all contacts on the root: in world axes [N], in its own [N.m].
         others: (6,) wrench of grips, less that of contacts on which the body only leans [N, N.m].
+        grips: Force [N] and its point [m] of every grip, (2, 3) each, by effector.
         geoms: (k, 2) geometries of the engine.
         depths: (k,) penetration [m].
         positions: (k, 3) [m].
-        normals: (k, 3) from the first geometry to the second.
+        frames: (k, 9) matrices whose rows are the axes of the contact, the first from the first geometry to
+            the second.
         friction: (k,) coefficient.
-        rows: (k,) constraint of each point; negative without one, and where the body only leans.
-        pressing: (k,) normal force, where it has one [N].
+        forces: (k, 3) along these axes on the second geometry [N].
+        leant: (k,) whether the body only leans there.
     """
 
     time: float
     root: FloatArray
+    qvel: FloatArray
+    qacc: FloatArray
     rotation: FloatArray
     force: FloatArray
     others: FloatArray
+    grips: Mapping[str, FloatArray]
     geoms: NDArray[np.int32]
     depths: FloatArray
     positions: FloatArray
-    normals: FloatArray
+    frames: FloatArray
     friction: FloatArray
-    rows: NDArray[np.int32]
-    pressing: FloatArray
+    forces: FloatArray
+    leant: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

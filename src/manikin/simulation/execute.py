@@ -191,12 +191,10 @@ class _Run:
             control += clock.perf_counter() - before
             if number == 0:
                 self.world.forget()
-            self._advance(output.tau, 1)
-            sensed = self.world.sense()
-            self._advance(output.tau, self.substeps - 1)
+            self._advance(output.tau, self.substeps)
             steps = self.world.take()
             if number >= 0:
-                self.recorder.record(sensed, output, steps)
+                self.recorder.record(output, steps)
                 if self._failed(output):
                     break
             number += 1
@@ -289,12 +287,12 @@ class _Run:
         if not self.failure and touches:
             self.failure, self.failure_time = f"unplanned touch: {touches[0]}", touches[0].time
         balance = recorder.margins(self.body.mass, world)
-        executed = recorder.motion(self.body.joint_names, balance.margin)
+        executed = recorder.motion(self.body.joint_names, balance.margin, world)
         com = recorder.com_errors()
         bound = com[: max(recorder.bound_samples(), 1)]
         peak = np.abs(executed.tau[:, 6:]).max(axis=0)
         error, effector, error_time = recorder.worst_effector()
-        fallbacks = ((s.sensed.time, s.output.fallback) for s in recorder.samples if s.output.fallback)
+        fallbacks = ((s.time, s.output.fallback) for s in recorder.samples if s.output.fallback)
         return Execution(
             motion=executed, fell=fell, failure=self.failure, failure_time_s=self.failure_time,
             com_rms_error_m=float(np.sqrt(np.mean(bound**2))), com_max_error_m=float(bound.max()),

@@ -48,7 +48,7 @@ def push_outcome(pushes: Sequence[Push], recorder: Recorder, failure: str) -> Pu
     if not pushes:
         return None
     first = min(pushes, key=lambda push: push.start)
-    since = np.array([sample.sensed.time for sample in recorder.samples]) - first.start
+    since = np.array([sample.time for sample in recorder.samples]) - first.start
     errors, back = recorder.com_errors(), None
     if not failure and errors[-1] <= BACK:  # when the errors stay small to the end
         off = np.flatnonzero(errors > BACK)

@@ -20,7 +20,6 @@ from manikin.simulation.carrying import (
     CarriedPoints,
     CarryingContacts,
     EngineStep,
-    Sensed,
     carried_margin,
 )
 from manikin.simulation.world import World
@@ -37,21 +36,24 @@ class Sample:
     """One control step as it happened.
 
     Attributes:
-        sensed: Contact forces and acceleration at the beginning of the step.
         output: Decision of the controller there.
         planned: Contact that each effector has, or in flight the one to come or else the last.
-        steps: Its engine steps.
+        steps: Its engine steps, the first of which tells contact forces and accelerations at its beginning.
     """
 
-    sensed: Sensed
     output: ControlOutput
     planned: Mapping[str, Contact]
     steps: tuple[EngineStep, ...]
 
     @property
+    def time(self) -> float:
+        """When it begins [s]."""
+        return self.steps[0].time
+
+    @property
     def plan_time(self) -> float:
         """Time of the plan [s], which may have waited for the body."""
-        return self.sensed.time - self.output.waited
+        return self.time - self.output.waited
 
 
 class Recorder:
@@ -65,10 +67,11 @@ class Recorder:
         self.samples: list[Sample] = []
         self._intervals = {name: support_intervals(schedule, name, SWITCHING) for name in self.effectors}
 
-    def record(self, sensed: Sensed, output: ControlOutput, steps: tuple[EngineStep, ...]) -> None:
-        """Add one control step: what is sensed at its beginning, its decision and its engine steps."""
-        planned = {name: self._nearest_contact(name, sensed.time - output.waited) for name in self.effectors}
-        self.samples.append(Sample(sensed, output, planned, steps))
+    def record(self, output: ControlOutput, steps: tuple[EngineStep, ...]) -> None:
+        """Add one control step: its decision and its engine steps."""
+        time = steps[0].time - output.waited
+        planned = {name: self._nearest_contact(name, time) for name in self.effectors}
+        self.samples.append(Sample(output, planned, steps))
 
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""
@@ -120,7 +123,7 @@ class Recorder:
             shares = friction_share(contact, np.array([force for *_, force in pressed]), model)
             if shares.max() > most.share:
                 number, name, _ = pressed[int(np.argmax(shares))]
-                most = FrictionUse(model, float(shares.max()), self.samples[number].sensed.time, name)
+                most = FrictionUse(model, float(shares.max()), self.samples[number].time, name)
         return most
 
     def com_errors(self) -> FloatArray:
@@ -142,7 +145,7 @@ class Recorder:
         if not len(errors):
             return 0.0, "", 0.0
         row, column = divmod(int(np.argmax(errors)), len(firm))
-        return float(errors.max()), firm[column], self.samples[row].sensed.time
+        return float(errors.max()), firm[column], self.samples[row].time
 
     def last_effector_error(self) -> float:
         """Largest distance of an effector's origin from its plan in the last step [m]; counted as above."""
@@ -182,39 +185,36 @@ class Recorder:
         frames = sample.output.state.frames
         return carrying.stance(
             points, lambda name: (frames[name].position, frames[name].rotation), sample.planned,
-            [name for name in self.effectors if name in sample.sensed.grips],
+            [name for name in self.effectors if name in sample.steps[0].grips],
             self._schedule.stance_at(sample.plan_time).model,
         )  # fmt: skip
 
-    def _wrenches(self) -> FloatArray:
+    def _wrenches(self, world: World) -> FloatArray:
         """(n, effectors, 6) measured force and moment on each effector about its planned contact's origin."""
-        sensed = [sample.sensed for sample in self.samples]
-        owner = np.repeat(np.arange(len(sensed)), [len(one.segments) for one in sensed])
-        segments = np.array([name for one in sensed for name in one.segments], dtype=object)
-        on_scene, places, forces = (
-            np.concatenate([getattr(one, key) for one in sensed])
-            for key in ("on_scene", "positions", "forces")
-        )
-        wrenches = np.zeros((len(sensed), len(self.effectors), 6))
+        first = [sample.steps[0] for sample in self.samples]
+        owner, segments, places, forces = world.scene_forces(first)
+        wrenches = np.zeros((len(first), len(self.effectors), 6))
         for column, name in enumerate(self.effectors):
             planned = [sample.planned[name] for sample in self.samples]
             about = np.array([contact.position for contact in planned])
-            chosen = np.flatnonzero(on_scene & np.isin(segments, self._segments[name]))
+            chosen = np.flatnonzero(np.isin(segments, self._segments[name]))
             rows, force = owner[chosen], forces[chosen]
             moment = cross(places[chosen] - about[rows], force)
             np.add.at(wrenches[:, column], rows, np.hstack([force, moment]))
             for row, contact in enumerate(planned):
                 if contact.kind is ContactKind.GRASP:
-                    wrenches[row, column] = sensed[row].grip_wrench(name, contact.position)
+                    force, place = first[row].grips.get(name, np.zeros((2, 3)))
+                    moment = cross(place - contact.position, force)
+                    wrenches[row, column] = np.concatenate((force, moment))
         return wrenches
 
-    def motion(self, joint_names: Sequence[str], margin: FloatArray) -> Motion:
-        """Turn the samples into a motion with its margin (n,) [N.m]."""
+    def motion(self, joint_names: Sequence[str], margin: FloatArray, world: World) -> Motion:
+        """Turn the samples of a world into a motion with its margin (n,) [N.m]."""
         return executed_motion(
-            np.round([s.sensed.time for s in self.samples], 9) + 0.0,  # the engine adds up its steps
-            [s.output.state for s in self.samples], a=np.array([s.sensed.a for s in self.samples]),
+            np.round([s.time for s in self.samples], 9) + 0.0,  # the engine adds up its steps
+            [s.output.state for s in self.samples], a=world.accelerations([s.steps[0] for s in self.samples]),
             tau=np.array([s.output.tau for s in self.samples]), margin=margin,
-            contact_force=self._wrenches(),
+            contact_force=self._wrenches(world),
             contact_names=tuple(self.effectors), joint_names=tuple(joint_names),
         )  # fmt: skip
 

@@ -17,8 +17,10 @@ from manikin.simulation.compile import SimulationModel, compile_model, obstacle_
 from manikin.simulation.push_force import Push
 
 _WRENCH = ("root", "rotation", "force", "others")
-_POINTS = ("geoms", "positions", "normals", "friction", "rows", "pressing")
+_POINTS = ("geoms", "positions", "frames", "friction", "forces", "leant")
 """What of engine steps makes wrenches, and the points that carried them."""
+
+_AXES = np.arange(3)
 
 _INERTIAL = (
     "body_mass", "body_ipos", "body_iquat", "body_inertia", "body_subtreemass", "body_invweight0", "dof_M0",
@@ -251,18 +253,15 @@ class World:
         force, moment = forces[:, :3], np.einsum("sij,sj->si", turns.reshape(-1, 3, 3), forces[:, 3:])
         # Inner forces cancel in the root.
         np.add.at(wrenches, owner, np.hstack([force, cross(roots, force) + moment]) + others)
-        geoms, positions, normals, friction, rows, pressing = (
+        geoms, positions, frames, friction, forces, leant = (
             np.concatenate([getattr(step, key) for step in steps]) for key in _POINTS
         )
-        span = np.repeat(owner, [len(step.geoms) for step in steps])
-        ours = self._is_segment[geoms]
-        carries = np.flatnonzero((ours[:, 0] != ours[:, 1]) & (rows >= 0) & (pressing > 0.0))
-        geoms, span, ours = geoms[carries], span[carries], ours[carries, 1]
-        # The engine's normal goes from the first geometry to the second.
-        normals = np.where(ours, 1.0, -1.0)[:, None] * normals[carries]
-        own, other = (self._names[side].tolist() for side in np.where(ours, geoms[:, ::-1].T, geoms.T))
-        positions, friction, pressing = positions[carries], friction[carries], pressing[carries]
-        pressing /= lengths[span]
+        own, other, sign = self._sides(geoms)
+        carries = np.flatnonzero(~self._is_segment[other] & ~leant & (forces[:, 0] > 0.0))
+        span = np.repeat(owner, [len(step.geoms) for step in steps])[carries]
+        own, other = self._names[own[carries]].tolist(), self._names[other[carries]].tolist()
+        positions, friction = positions[carries], friction[carries]
+        normals, pressing = sign[carries] * frames[carries, :3], forces[carries, 0] / lengths[span]
         ends = np.searchsorted(span, np.arange(len(spans) + 1)).tolist()
         carried = [
             CarriedPoints(tuple(own[a:b]), tuple(other[a:b]), positions[a:b], normals[a:b], pressing[a:b],
@@ -270,6 +269,44 @@ class World:
             for a, b in pairwise(ends)
         ]  # fmt: skip
         return wrenches / lengths[:, None], carried
+
+    def accelerations(self, steps: Sequence[EngineStep]) -> FloatArray:
+        """(n, nv) generalised accelerations in n engine steps [m/s^2, rad/s^2]."""
+        a = np.array([step.qacc for step in steps])
+        to_root = np.array([step.rotation for step in steps]).reshape(-1, 3, 3).transpose(0, 2, 1)
+        speeds = np.array([step.qvel[:6] for step in steps])
+        linear, acceleration = (np.einsum("sij,sj->si", to_root, one[:, :3]) for one in (speeds, a))
+        a[:, :3] = acceleration - cross(speeds[:, 3:], linear)
+        return a
+
+    def scene_forces(
+        self, steps: Sequence[EngineStep]
+    ) -> tuple[NDArray[np.int64], NDArray[np.object_], FloatArray, FloatArray]:
+        """Contact points of body and scene in some engine steps.
+
+        Returns:
+            (k,) step of each, (k,) its segment, (k, 3) its place [m], (k, 3) the force there [N].
+        """
+        geoms, positions, frames, forces = (
+            np.concatenate([getattr(step, key) for step in steps])
+            for key in ("geoms", "positions", "frames", "forces")
+        )
+        own, other, sign = self._sides(geoms)
+        chosen = np.flatnonzero(~self._is_segment[other])
+        owner = np.repeat(np.arange(len(steps)), [len(step.geoms) for step in steps])
+        forces = sign * np.einsum("ki,kij->kj", forces, frames.reshape(-1, 3, 3))
+        return owner[chosen], self._names[own[chosen]], positions[chosen], forces[chosen]
+
+    def _sides(
+        self, geoms: NDArray[np.int32]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+        """(k,) geometry of the body and (k,) the other one of pairs (k, 2); (k, 1) sign of what acts on it.
+
+        The engine's contact frame has x from the first geometry to the second, on which its force acts.
+        """
+        ours = self._is_segment[geoms[:, 1]]
+        own, other = np.where(ours, geoms.T[::-1], geoms.T)
+        return own, other, np.where(ours, 1.0, -1.0)[:, None]
 
     @property
     def penetration(self) -> float:
@@ -285,18 +322,21 @@ class World:
 
     def _kept(self) -> EngineStep:
         """Copy of what was measured in the engine step that was just made."""
-        data, contact, (qpos, _, time) = self._data, self._data.contact, self._before
-        geoms, rows, others = contact.geom.copy(), contact.efc_address.copy(), np.zeros(6)
+        data, contact, (qpos, qvel, time) = self._data, self._data.contact, self._before
+        geoms, first, others = contact.geom.copy(), contact.efc_address, np.zeros(6)
         for pull, position in self._grip_forces.values():
             others += np.concatenate((pull, cross(position, pull)))
-        forces = data.efc_force[rows] if data.nefc else np.zeros(len(rows))
+        forces, leant = np.zeros((len(geoms), 3)), np.zeros(len(geoms), dtype=bool)
+        if data.nefc:
+            acts = first >= 0
+            forces[acts] = data.efc_force[first[acts, None] + _AXES]
         if self._leans:
             others -= self._leaning_wrench()
-            rows[self._leaning[geoms[:, 0], geoms[:, 1]]] = -1
+            leant = self._leaning[geoms[:, 0], geoms[:, 1]]
         return EngineStep(
-            time, qpos[:3], data.xmat[self._root].copy(), data.qfrc_constraint[:6].copy(), others, geoms,
-            -contact.dist, contact.pos.copy(), contact.frame[:, :3].copy(), contact.friction[:, 0].copy(),
-            rows, forces,
+            time, qpos[:3], qvel, data.qacc.copy(), data.xmat[self._root].copy(),
+            data.qfrc_constraint[:6].copy(), others, dict(self._grip_forces), geoms, -contact.dist,
+            contact.pos.copy(), contact.frame.copy(), contact.friction[:, 0].copy(), forces, leant,
         )  # fmt: skip
 
     def _measure(self) -> None:
@@ -304,15 +344,13 @@ class World:
         steps, self._unmeasured = self._unmeasured, []
         if not steps:
             return
-        geoms, depths, rows, pressing = (
-            np.concatenate([getattr(step, key) for step in steps])
-            for key in ("geoms", "depths", "rows", "pressing")
+        geoms, depths, forces = (
+            np.concatenate([getattr(step, key) for step in steps]) for key in ("geoms", "depths", "forces")
         )
         unplanned = np.flatnonzero(~self._planned[geoms[:, 0], geoms[:, 1]])
         if len(unplanned):
             times = np.repeat([step.time for step in steps], [len(step.geoms) for step in steps])
-            forces = np.where(rows >= 0, pressing, 0.0)
-            self._note_touches(times[unplanned], geoms[unplanned], forces[unplanned])
+            self._note_touches(times[unplanned], geoms[unplanned], forces[unplanned, 0])
         if self._pads:
             padded = self._padded[geoms].any(axis=1)
             deepest = float(depths[padded].max(initial=0.0))
@@ -326,9 +364,9 @@ class World:
         for time, (first, second), force in zip(times.tolist(), geoms.tolist(), forces.tolist(), strict=True):
             key = time, *self._parties(first, second)[:2]
             pressed[key] = pressed.get(key, 0.0) + force
-        for (time, *pair), force in pressed.items():
-            known = self._touches.setdefault((pair[0], pair[1]), Touch(time, *pair))
-            self._touches[pair[0], pair[1]] = replace(known, force=max(known.force, force))
+        for (time, segment, other), force in pressed.items():
+            known = self._touches.get((segment, other), Touch(time, segment, other))
+            self._touches[segment, other] = replace(known, force=max(known.force, force))
 
     def _leaning_wrench(self) -> FloatArray:
         """Wrench of the contacts of the last step in which the body only leans on something."""
@@ -366,10 +404,10 @@ class World:
         self._data.xfrc_applied[body, 3:] += cross(position - self._data.xipos[body], force)
         self._grip_forces[grip.effector] = np.stack((force, position))
 
-    def touching(self, segments: Sequence[str], obstacle: str) -> bool:
+    def touching(self, segments: tuple[str, ...], obstacle: str) -> bool:
         """Whether one of the segments was in contact with the obstacle in the last engine step."""
-        geoms = self._data.contact.geom
-        return bool(self._table(tuple(segments), obstacle)[geoms[:, 0], geoms[:, 1]].any())
+        first, second = self._data.contact.geom.T
+        return bool(self._table(segments, obstacle)[first, second].any())
 
     def _table(self, segments: tuple[str, ...], obstacle: str) -> NDArray[np.bool_]:
         """(geometries, geometries) whether two geometries are one of the segments and the obstacle."""
@@ -387,22 +425,14 @@ class World:
 
     def sense(self) -> Sensed:
         """Return accelerations and contact forces of the last engine step."""
-        qpos, qvel, time = self._before
-        contact, efc_force = self._data.contact, self._data.efc_force
-        geoms, frames = contact.geom, contact.frame.reshape(-1, 3, 3)
-        swapped = ~self._is_segment[geoms[:, 1]]
-        own, other = np.where(swapped, geoms.T, geoms[:, ::-1].T)
-        # The engine's contact frame has x from the first geometry to the second, on which its force acts.
-        sign, address = np.where(swapped, -1.0, 1.0)[:, None], contact.efc_address
-        forces = np.zeros((len(geoms), 3))
-        acts = np.flatnonzero(address >= 0)
-        forces[acts] = efc_force[address[acts, None] + np.arange(3)]
+        step = self._kept()
+        own, other, sign = self._sides(step.geoms)
+        frames = step.frames.reshape(-1, 3, 3)
         return Sensed(
-            time, self.model.a_from_mujoco(qpos, qvel, self._data.qacc),
-            segments=tuple(self._names[own].tolist()), others=tuple(self._names[other].tolist()),
-            on_scene=~self._is_segment[other], positions=contact.pos.copy(), normals=sign * frames[:, 0],
-            forces=sign * np.einsum("ki,kij->kj", forces, frames), depths=-contact.dist,
-            grips=dict(self._grip_forces),
+            step.time, self.accelerations([step])[0], segments=tuple(self._names[own].tolist()),
+            others=tuple(self._names[other].tolist()), on_scene=~self._is_segment[other],
+            positions=step.positions, normals=sign * frames[:, 0],
+            forces=sign * np.einsum("ki,kij->kj", step.forces, frames), depths=step.depths, grips=step.grips,
         )  # fmt: skip
 
     def _parties(self, first: int, second: int) -> tuple[str, str, bool]:
