@@ -23,7 +23,7 @@ LIMITS = SwingLimits(speed=2.0, angular_speed=5.0)
 ENDS = Pose(np.zeros(3), np.eye(3)), Pose(np.array([1.0, 0.0, 0.0]), np.eye(3))
 STANDING = sole("right_foot", (0.7, 0.65, 0.2), np.pi / 2, length=0.28, width=0.12, friction=0.7)
 COM = np.array([0.66, 0.6, 0.84])
-CLEARANCE = EffectorClearance(BODY, SCENE, "left_foot", [STANDING], lambda _time: COM)
+CLEARANCE = EffectorClearance(BODY, SCENE, "left_foot", [STANDING], lambda _contact, _time: COM)
 
 
 def over_a_wall(pose, _time, _hint):

@@ -150,7 +150,8 @@ def test_a_thigh_that_kneels_is_kept_clear_of_where_the_posture_has_it():
     assert planner._pitch(swing, 1.0) == 0.0  # a shank needs no turn, unlike a foot left as far behind
     clearance, pose = planner._clearance(swing), Pose.of(held["left_knee"])
     beside = Pose(pose.position + np.array([0.25, -0.02, 0.08]), pose.rotation)
-    room = [clearance(time, beside) for time in (1.0, 1.5, 2.0)]
+    places, turns = (np.array([part] * 3) for part in beside)
+    room = clearance(np.array([1.0, 1.5, 2.0]), places, turns).distance
     np.testing.assert_allclose(room, room[0], atol=1e-9)
     # Nearest is the thigh that stands, upright by less than 20 degrees.
     radius = {name: body.segment(name).shapes[0].size[0] for name in ("left_leg", "right_thigh")}

@@ -11,7 +11,7 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.whole_body.swing import SwingLimits, check_swing, plan_swing
 from manikin.planning.whole_body.swing_curve import SwingCurve
-from manikin.planning.whole_body.swing_path import EffectorPath, Pose
+from manikin.planning.whole_body.swing_path import EffectorPath, Nearness, Pose
 
 FACING_Y = rotation_from_yaw(np.pi / 2)
 IDENTITY = np.eye(3)
@@ -22,6 +22,24 @@ PLATFORM = ((1.1, 1.5, 0.2), (0.9, 0.75, 0.1))
 
 def make_pose(position, rotation=IDENTITY):
     return Pose(np.array(position, dtype=float), rotation)
+
+
+def pointwise(function):
+    """Clearance from a function of one instant and pose, its gradient by forward differences."""
+
+    def clearance(time, position, rotation, within=np.inf):
+        def distances(places):
+            poses = zip(time, places, rotation, strict=True)
+            return np.array([function(instant, Pose(place, turn)) for instant, place, turn in poses])
+
+        distance = distances(position)
+        slopes = np.stack(
+            [(distances(position + 1e-4 * axis) - distance) / 1e-4 for axis in np.eye(3)], axis=1
+        )
+        near = distance < within
+        return Nearness(np.where(near, distance, np.inf), near[:, None] * slopes)
+
+    return clearance
 
 
 def box_clearance(standing=None):
@@ -45,11 +63,10 @@ def box_clearance(standing=None):
                 distances.append(coal.distance(shape, place, other, where, coal.DistanceRequest(), result))
         return min(distances)
 
-    return clearance
+    return pointwise(clearance)
 
 
-def open_space(_time, _pose):
-    return 1.0
+open_space = pointwise(lambda _time, _pose: 1.0)
 
 
 positions = st.tuples(*[st.floats(-1, 1)] * 3)
@@ -205,6 +222,7 @@ def test_planning_is_deterministic():
 def test_a_closed_way_is_explained():
     """A wall without end cannot be passed; the message says where and when."""
 
+    @pointwise
     def wall(_time, pose):
         return abs(pose.position[0] - 0.25) - 0.05
 
@@ -224,6 +242,7 @@ def test_too_little_time_is_explained():
 def test_clearance_may_depend_on_time():
     """An obstacle that leaves late is waited for or passed above."""
 
+    @pointwise
     def gate(time, pose):
         inside = 0.2 < pose.position[0] < 0.3 and time < 0.35
         return pose.position[2] - 0.15 if inside else 0.5
@@ -257,6 +276,7 @@ def test_too_fast_a_flight_is_not_lifted_higher():
     """0.83 m in 0.4 s needs more than 3 m/s at any height: the lowest clear curve is the best attempt."""
     start, goal = make_pose((0, 0, 0)), make_pose((0.83, 0, 0))
 
+    @pointwise
     def above_floor(_time, pose):
         return float(pose.position[2])
 

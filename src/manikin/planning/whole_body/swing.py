@@ -6,7 +6,7 @@ moved by sequential quadratic programming (least squared jerk, linearised distan
 """
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,10 +23,7 @@ from manikin.planning.whole_body.swing_curve import (
     block_rows,
     jerk_energy,
 )
-from manikin.planning.whole_body.swing_path import Pose
-
-Clearance = Callable[[float, Pose], float]
-"""Signed distance [m] of an effector at a pose and a time [s] to everything it must not touch."""
+from manikin.planning.whole_body.swing_path import Clearance, Pose
 
 HEIGHTS = (0.06, 0.10, 0.15, 0.22, 0.30, 0.42, 0.56, 0.70)
 """Apex heights above the higher end that are tried [m]."""
@@ -94,7 +91,7 @@ def plan_swing(
     Args:
         start_time: Lift-off [s].
         end_time: Touch-down [s].
-        clearance: Signed distance of the effector at a time and pose [m].
+        clearance: Of the effector.
         start_normal: (3,) normal of the surface that is left.
         end_normal: (3,) normal of the surface that is reached.
         pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
@@ -120,13 +117,14 @@ def plan_swing(
         )
         for height, lateral, apex in sorted(itertools.product(heights, laterals, APEXES), key=_exertion)
     )  # fmt: skip
-    best = _first_clear(family, clearance, limits)
+    gauge = _Gauge.of(start, goal, (start_time, end_time), clearance, limits)
+    best = gauge.first_clear(family)
     curve, free = best.curve, _free_directions(leaving, reaching, len(best.curve.control_position))
     for _ in range(refine):
-        step = _best_step(curve, clearance, limits, free)
+        step = gauge.best_step(curve, free)
         moved = curve.control_position + (free @ step).reshape(-1, 3)
         curve = SwingCurve(curve.start_time, curve.end_time, moved, curve.control_rotation)
-        plan = check_swing(curve, clearance, limits)
+        plan = gauge.check(curve)
         best = max(best, plan, key=_rank)
         if np.abs(step).max() < (SETTLED if plan.succeeded else STATIONARY):
             break
@@ -135,68 +133,147 @@ def plan_swing(
 
 def check_swing(curve: SwingCurve, clearance: Clearance, limits: SwingLimits) -> SwingPlan:
     """Measure a curve against its limits, densely in time."""
-    state, distance, required = _measured(curve, clearance, limits)
-    slack = (distance - required)[1:-1]  # at the contacts themselves it is zero by definition
-    worst = int(np.argmin(slack)) + 1
-    in_flight = required >= limits.clearance
-    smallest = float(distance[in_flight].min() if np.any(in_flight) else distance[1:-1].min())
-    failure = curve.haste(limits.speed, limits.angular_speed)
-    if slack[worst - 1] < -TOLERANCE:
-        position = ", ".join(f"{x:.3f}" for x in state.position[worst])
-        failure = (
-            f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
-            f"[{position}]; required {required[worst]:.4f} m"
-        )
-    return SwingPlan(curve, float(slack[worst - 1]), smallest, failure)
+    times = curve.start_time, curve.end_time
+    return _Gauge.of(curve.start, curve.end, times, clearance, limits).check(curve)
 
 
-def _first_clear(family: Iterator[SwingCurve], clearance: Clearance, limits: SwingLimits) -> SwingPlan:
-    """First curve that keeps the limits, or else the first of those nearest to clear.
+@dataclass(frozen=True, eq=False)
+class _Gauge:
+    """Measures the curves of one flight.
 
-    A curve is given up at the first instant at which it is too near and no better than the best one before
-    it. Instants at which curves were given up are looked at first.
+    Attributes:
+        at_contact: (2,) clearances at both ends [m].
     """
-    best, least = None, -np.inf
-    # Order of few instants at which a curve is looked at before it is checked densely, and of the dense ones.
-    coarse, dense = list[int](), list[int]()
-    for curve in family:
-        slack = _least_slack(curve, clearance, limits, least, coarse, 13)
-        if slack >= -TOLERANCE:
-            if curve.haste(limits.speed, limits.angular_speed) is not None:
-                # Higher ones are faster still: what slows one down is the optimisation.
-                return check_swing(curve, clearance, limits)
-            slack = _least_slack(curve, clearance, limits, least, dense)
+
+    clearance: Clearance
+    limits: SwingLimits
+    at_contact: FloatArray
+
+    @classmethod
+    def of(
+        cls, start: Pose, goal: Pose, times: tuple[float, float], clearance: Clearance, limits: SwingLimits
+    ) -> "_Gauge":
+        """The gauge of flights between two poses."""
+        position, rotation = (np.array(part) for part in zip(start, goal, strict=True))
+        return cls(clearance, limits, clearance(np.array(times), position, rotation).distance)
+
+    def check(self, curve: SwingCurve) -> SwingPlan:
+        """See :func:`check_swing`."""
+        state, distance, required = self._dense(curve, LOOKED)
+        in_flight = required >= self.limits.clearance
+        in_flight = in_flight if in_flight.any() else np.arange(len(required)) % (len(required) - 1) > 0
+        if not np.isfinite([(distance - required)[1:-1].min(), distance[in_flight].min()]).all():
+            state, distance, required = self._dense(curve, np.inf)
+        slack = (distance - required)[1:-1]  # at the contacts themselves it is zero by definition
+        worst = int(np.argmin(slack)) + 1
+        failure = curve.haste(self.limits.speed, self.limits.angular_speed)
+        if slack[worst - 1] < -TOLERANCE:
+            position = ", ".join(f"{x:.3f}" for x in state.position[worst])
+            failure = (
+                f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
+                f"[{position}]; required {required[worst]:.4f} m"
+            )
+        return SwingPlan(curve, float(slack[worst - 1]), float(distance[in_flight].min()), failure)
+
+    def first_clear(self, family: Iterator[SwingCurve]) -> SwingPlan:
+        """First curve that keeps the limits, or else the first of those nearest to clear.
+
+        A curve is given up at the first instant at which it is too near and no better than the best one
+        before it. Instants at which curves were given up are looked at first.
+        """
+        best, least = None, -np.inf
+        # Order of few instants at which a curve is looked at before it is checked densely, and of the dense
+        # ones.
+        coarse, dense = list[int](), list[int]()
+        for curve in family:
+            slack = self._least_slack(curve, least, coarse, 13)
             if slack >= -TOLERANCE:
-                return check_swing(curve, clearance, limits)
-        if best is None or min(slack, 0.0) > least:
-            best, least = curve, min(slack, 0.0)
-    assert best is not None  # a family has members
-    return check_swing(best, clearance, limits)
+                if curve.haste(self.limits.speed, self.limits.angular_speed) is not None:
+                    # Higher ones are faster still: what slows one down is the optimisation.
+                    return self.check(curve)
+                slack = self._least_slack(curve, least, dense)
+                if slack >= -TOLERANCE:
+                    return self.check(curve)
+            if best is None or min(slack, 0.0) > least:
+                best, least = curve, min(slack, 0.0)
+        assert best is not None  # a family has members
+        return self.check(best)
 
+    def _least_slack(
+        self, curve: SwingCurve, known: float, order: list[int], count: int | None = None
+    ) -> float:
+        """Smallest slack [m]; of what is neither clear nor better than ``known``, the first that shows it.
 
-def _least_slack(
-    curve: SwingCurve, clearance: Clearance, limits: SwingLimits, known: float, order: list[int],
-    count: int | None = None,
-) -> float:  # fmt: skip
-    """Smallest slack [m]; of what is neither clear nor better than ``known``, the first that shows it.
+        That instant becomes the first in the order in which they are looked at. Of what is clear it is
+        infinite.
+        """
+        state = curve.evaluate(self._instants(curve, count))
+        required = self._required(state)
+        order[:] = order or range(1, len(required) - 1)
+        smallest, enough = np.inf, min(known + TOLERANCE, -TOLERANCE)
+        for first, last in ((0, 1), (1, len(order))):
+            rows = order[first:last]
+            poses = state.time[rows], state.position[rows], state.rotation[rows]
+            slack = self.clearance(*poses, required[rows]).distance - required[rows]
+            shown = np.flatnonzero(slack < enough)
+            if len(shown):
+                order.insert(0, order.pop(first + int(shown[0])))
+                return float(min(smallest, slack[: shown[0] + 1].min()))
+            smallest = min(smallest, float(slack.min(initial=np.inf)))
+        return smallest
 
-    That instant becomes the first in the order in which they are looked at.
-    """
-    state = curve.evaluate(_instants(curve, limits, count))
+    def _instants(self, curve: SwingCurve, count: int | None = None) -> FloatArray:
+        count = count or max(33, int(np.ceil(curve.duration / self.limits.time_step)) + 1)
+        return np.linspace(curve.start_time, curve.end_time, count)
 
-    def distance(index: int) -> float:
-        return clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
+    def _required(self, state: SwingState) -> FloatArray:
+        """Distance wanted at each instant of a whole curve, from those at its two contacts."""
+        from_start, to_end = (np.linalg.norm(state.position - state.position[end], axis=1) for end in (0, -1))
+        return required_clearance((from_start, to_end), self.at_contact, self.limits)
 
-    last = len(state.time) - 1
-    order[:] = order or range(1, last)
-    required = _required(curve, state, (distance(0), distance(last)), limits)
-    smallest, enough = np.inf, min(known + TOLERANCE, -TOLERANCE)
-    for place, index in enumerate(order):
-        smallest = min(smallest, distance(index) - float(required[index]))
-        if smallest < enough:
-            order.insert(0, order.pop(place))
-            break
-    return smallest
+    def _dense(self, curve: SwingCurve, room: float) -> tuple[SwingState, FloatArray, FloatArray]:
+        """States at dense instants, distances where less than a room beyond those required, and these [m]."""
+        state = curve.evaluate(self._instants(curve))
+        required = self._required(state)
+        near = self.clearance(state.time, state.position, state.rotation, required + room)
+        return state, near.distance, required
+
+    def best_step(self, curve: SwingCurve, free: FloatArray) -> FloatArray:
+        """One quadratic program: least squared jerk under linearised distances and speeds.
+
+        Args:
+            free: (3n, f) directions in which the control points may move, whose shares are found.
+        """
+        n = len(curve.control_position)
+        # Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort.
+        energy = block_rows(jerk_energy(n) / 720.0)
+        distance_rows, distance_lower = self._distance_rows(curve)
+        speed_rows, speed_lower = _speed_rows(curve, self.limits)
+        rows, count = np.vstack([distance_rows, speed_rows]) @ free, free.shape[1]
+        lower = np.concatenate([distance_lower, speed_lower])
+        # One last unknown: the worst violation, costly but allowed.
+        hessian = np.zeros((count + 1, count + 1))
+        hessian[:count, :count] = free.T @ energy @ free + 1e-6 * np.eye(count)
+        hessian[count, count] = 1.0
+        gradient = np.concatenate([free.T @ (energy @ curve.control_position.ravel()), [1e3]])
+        matrix = np.hstack([rows, np.ones((len(rows), 1))])
+        bounds = np.append(np.full(count, -TRUST), 0.0), np.append(np.full(count, TRUST), 1e3)
+        solution = solve_qp(hessian, gradient, matrix, lower, None, bounds)
+        return solution.x[:count] if solution.solved else np.zeros(count)
+
+    def _distance_rows(self, curve: SwingCurve) -> tuple[FloatArray, FloatArray]:
+        """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
+        # Spacing of the instants at which the optimisation linearises the distances [s].
+        count, n = max(33, int(curve.duration / 0.012)), len(curve.control_position)
+        state = curve.evaluate(self._instants(curve, count))
+        required = self._required(state)
+        near = self.clearance(state.time, state.position, state.rotation, required + 0.1)
+        index = np.flatnonzero(np.isfinite(near.distance))[1:-1]
+        weights = basis((state.time[index] - curve.start_time) / curve.duration, n)
+        rows = (weights[:, :, None] * near.gradient[index, None]).reshape(-1, 3 * n)
+        # Near its contacts the effector cannot have gained the whole buffer yet.
+        share = np.clip(required[index] / max(self.limits.clearance, BUFFER), 0.0, 1.0)
+        return rows, required[index] + BUFFER * share - near.distance[index]
 
 
 def _exertion(choice: tuple[float, float, float]) -> float:
@@ -204,23 +281,8 @@ def _exertion(choice: tuple[float, float, float]) -> float:
     return choice[0] + 0.5 * abs(choice[1]) + 0.2 * abs(choice[2] - 0.5)
 
 
-def _instants(curve: SwingCurve, limits: SwingLimits, count: int | None = None) -> FloatArray:
-    count = count or max(33, int(np.ceil(curve.duration / limits.time_step)) + 1)
-    return np.linspace(curve.start_time, curve.end_time, count)
-
-
-def _measured(
-    curve: SwingCurve, clearance: Clearance, limits: SwingLimits, count: int | None = None
-) -> tuple[SwingState, FloatArray, FloatArray]:
-    """States of a curve at its instants, with their distances and those required there [m]."""
-    state = curve.evaluate(_instants(curve, limits, count))
-    poses = zip(state.time, state.position, state.rotation, strict=True)
-    distance = np.array([clearance(float(t), Pose(p, r)) for t, p, r in poses])
-    return state, distance, _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
-
-
 def required_clearance(
-    moved: tuple[ArrayLike, ArrayLike], at_contact: tuple[float, float], limits: SwingLimits
+    moved: tuple[ArrayLike, ArrayLike], at_contact: FloatArray, limits: SwingLimits
 ) -> FloatArray:
     """Distance wanted: the full one in flight, less near the two contacts.
 
@@ -233,15 +295,6 @@ def required_clearance(
         contact + limits.departure * np.asarray(away) for away, contact in zip(moved, at_contact, strict=True)
     )
     return np.minimum(np.minimum(limits.clearance, left), reached)
-
-
-def _required(
-    curve: SwingCurve, state: SwingState, at_contact: tuple[float, float], limits: SwingLimits
-) -> FloatArray:
-    """Distance wanted at each instant of a curve, from those at its two contacts."""
-    from_start = np.linalg.norm(state.position - curve.start.position, axis=1)
-    to_end = np.linalg.norm(state.position - curve.end.position, axis=1)
-    return required_clearance((from_start, to_end), at_contact, limits)
 
 
 def _rank(plan: SwingPlan) -> tuple[bool, float]:
@@ -269,51 +322,8 @@ TOLERANCE, BUFFER = 5e-5, 0.003
 """Accuracy expected of distances, by which toes may dip as they leave, and what is aimed at beyond the
 required clearance, for what lies between the samples [m]."""
 
-
-def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, free: FloatArray) -> FloatArray:
-    """One quadratic program: least squared jerk under linearised distances and speeds."""
-    n = len(curve.control_position)
-    # Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort.
-    energy = block_rows(jerk_energy(n) / 720.0)
-    distance_rows, distance_lower = _distance_rows(curve, clearance, limits)
-    speed_rows, speed_lower = _speed_rows(curve, limits)
-    rows, count = np.vstack([distance_rows, speed_rows]) @ free, free.shape[1]
-    lower = np.concatenate([distance_lower, speed_lower])
-    # One last unknown: the worst violation, costly but allowed.
-    hessian = np.zeros((count + 1, count + 1))
-    hessian[:count, :count] = free.T @ energy @ free + 1e-6 * np.eye(count)
-    hessian[count, count] = 1.0
-    gradient = np.concatenate([free.T @ (energy @ curve.control_position.ravel()), [1e3]])
-    matrix = np.hstack([rows, np.ones((len(rows), 1))])
-    bounds = np.append(np.full(count, -TRUST), 0.0), np.append(np.full(count, TRUST), 1e3)
-    solution = solve_qp(hessian, gradient, matrix, lower, None, bounds)
-    return solution.x[:count] if solution.solved else np.zeros(count)
-
-
-def _distance_rows(
-    curve: SwingCurve, clearance: Clearance, limits: SwingLimits
-) -> tuple[FloatArray, FloatArray]:
-    """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
-    # Spacing of the instants at which the optimisation linearises the distances [s].
-    count, n = max(33, int(curve.duration / 0.012)), len(curve.control_position)
-    state, distance, required = _measured(curve, clearance, limits, count)
-    weights = basis((state.time - curve.start_time) / curve.duration, n)
-    rows, lower = [], []
-    for index in np.flatnonzero(distance - required < 0.1)[1:-1]:
-        pose = Pose(state.position[index], state.rotation[index])
-        slope = _slope(clearance, float(state.time[index]), pose, float(distance[index]))
-        rows.append(np.kron(weights[index], slope))
-        # Near its contacts the effector cannot have gained the whole buffer yet.
-        buffer = BUFFER * min(1.0, max(0.0, required[index]) / max(limits.clearance, BUFFER))
-        lower.append(required[index] + buffer - distance[index])
-    return np.array(rows).reshape(-1, 3 * n), np.array(lower)
-
-
-def _slope(clearance: Clearance, time: float, pose: Pose, distance: float) -> FloatArray:
-    """Gradient of the clearance with the position, by forward differences."""
-    step = 1e-4
-    moved = (Pose(pose.position + step * axis, pose.rotation) for axis in np.eye(3))
-    return np.array([(clearance(time, other) - distance) / step for other in moved])
+LOOKED = 0.02
+"""Distances this much beyond the required one are measured at first: the least one mostly is [m]."""
 
 
 def _speed_rows(curve: SwingCurve, limits: SwingLimits) -> tuple[FloatArray, FloatArray]:

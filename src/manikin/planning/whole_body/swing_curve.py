@@ -104,7 +104,8 @@ class SwingCurve:
         point = middle + (top - float(up @ middle)) * up + lateral * left
         gain = _least_jerk(controls, apex, _unit(start_normal).tobytes(), _unit(end_normal).tobytes())
         positions = (gain @ np.concatenate([start.position, goal.position, point])).reshape(controls, 3)
-        return cls(start_time, end_time, positions, _turning(start.rotation, goal.rotation, pitch, controls))
+        turns = _turning(start.rotation.tobytes(), goal.rotation.tobytes(), pitch, controls)
+        return cls(start_time, end_time, positions, turns)
 
     @classmethod
     def along(cls, path: EffectorPath, controls: int = 20, sharpening: int = 0) -> "SwingCurve":
@@ -156,7 +157,7 @@ class SwingCurve:
         share = np.clip((times - self.start_time) / self.duration, 0.0, 1.0)
         rate = 1.0 / self.duration
         weights = [basis(share, len(self.control_position), order) * rate**order for order in range(3)]
-        rotation, angular_velocity = self._turn(weights)
+        rotation, angular_velocity = _turned(self.control_rotation.tobytes(), share.tobytes(), rate)
         position, velocity, acceleration = (weight @ self.control_position for weight in weights)
         return SwingState(times, position, rotation, velocity, angular_velocity, acceleration)
 
@@ -192,22 +193,33 @@ class SwingCurve:
     def _dense(self) -> SwingState:
         return self.evaluate(np.linspace(self.start_time, self.end_time, 101))
 
-    def _turn(self, weights: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
-        """Rotation and angular velocity in the world from the basis and its rates."""
-        count = len(weights[0])
-        rotation = np.broadcast_to(self.control_rotation[0], (count, 3, 3)).copy()
-        velocity = np.zeros((count, 3))  # in the turning frame
-        relative = np.swapaxes(self.control_rotation[:-1], 1, 2) @ self.control_rotation[1:]
-        turns = Rotation.from_matrix(relative).as_rotvec()
-        turning = np.flatnonzero(np.any(np.abs(turns) > 1e-14, axis=1))
-        # Cumulative basis: the sum of the basis functions from this control pose on.
-        shares = [[w[:, index + 1 :].sum(axis=1)[:, None] for w in weights[:2]] for index in turning]
-        angles = np.array([b * turns[index] for index, (b, _) in zip(turning, shares, strict=True)])
-        steps = Rotation.from_rotvec(angles.reshape(-1, 3)).as_matrix().reshape(-1, count, 3, 3)
-        for index, step, (_, rate) in zip(turning, steps, shares, strict=True):
-            velocity = np.einsum("kji,kj->ki", step, velocity) + rate * turns[index]
-            rotation = rotation @ step
-        return rotation, np.einsum("kij,kj->ki", rotation, velocity)
+
+@lru_cache(maxsize=64)
+def _turned(control_rotation: bytes, shares: bytes, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Rotations (k, 3, 3) and angular velocities (k, 3) in the world, the same for all curves of a family.
+
+    Args:
+        control_rotation: (n, 3, 3) as bytes.
+        shares: (k,) of the duration, as bytes.
+        rate: One over the duration [1/s].
+    """
+    controls, share = np.frombuffer(control_rotation).reshape(-1, 3, 3), np.frombuffer(shares)
+    weights = [basis(share, len(controls), order) * rate**order for order in range(2)]
+    rotation = np.broadcast_to(controls[0], (len(share), 3, 3)).copy()
+    velocity = np.zeros((len(share), 3))  # in the turning frame
+    turns = Rotation.from_matrix(np.swapaxes(controls[:-1], 1, 2) @ controls[1:]).as_rotvec()
+    turning = np.flatnonzero(np.any(np.abs(turns) > 1e-14, axis=1))
+    # Cumulative basis: the sum of the basis functions from this control pose on.
+    cumulative = [[w[:, index + 1 :].sum(axis=1)[:, None] for w in weights] for index in turning]
+    angles = np.array([b * turns[index] for index, (b, _) in zip(turning, cumulative, strict=True)])
+    steps = Rotation.from_rotvec(angles.reshape(-1, 3)).as_matrix().reshape(-1, len(share), 3, 3)
+    for index, step, (_, slope) in zip(turning, steps, cumulative, strict=True):
+        velocity = np.einsum("kji,kj->ki", step, velocity) + slope * turns[index]
+        rotation = rotation @ step
+    found = rotation, np.einsum("kij,kj->ki", rotation, velocity)
+    for array in found:
+        array.setflags(write=False)
+    return found
 
 
 def _check_controls(count: int) -> None:
@@ -290,8 +302,15 @@ def _least_jerk(controls: int, apex: float, leaving: bytes, reaching: bytes) -> 
     return np.asarray(np.linalg.solve(system, targets)[: 3 * controls], dtype=np.float64)
 
 
-def _turning(start: FloatArray, goal: FloatArray, pitch: float, controls: int) -> FloatArray:
-    """Control rotations of the shortest turn, timed like a straight flight, and the extra pitch."""
+@lru_cache(maxsize=64)
+def _turning(leaving: bytes, reaching: bytes, pitch: float, controls: int) -> FloatArray:
+    """Control rotations of the shortest turn, timed like a straight flight, and the extra pitch.
+
+    Args:
+        leaving: (3, 3) rotation at the start, as bytes.
+        reaching: The same at the end.
+    """
+    start, goal = (np.frombuffer(turn).reshape(3, 3) for turn in (leaving, reaching))
     share = _straight_shares(controls)
     turn = Rotation.from_matrix(start.T @ goal).as_rotvec()
     decline = 2.0  # time in which the extra pitch fades relative to that in which it grows

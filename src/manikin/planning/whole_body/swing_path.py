@@ -7,8 +7,7 @@ its next segment pointing to a given place, such as the centre of mass.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import coal
 import numpy as np
@@ -19,9 +18,9 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import hanging_segment, toe_hinge
 from manikin.contact import Contact
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_normal
+from manikin.numerics.spatial import FloatArray, dot, frozen_array, rotation_from_normal
 from manikin.scene import Scene
-from manikin.scene.collision import collision_parts
+from manikin.scene.collision import collision_parts, local_box, pair_meter, part_meter
 
 
 class Pose(NamedTuple):
@@ -111,102 +110,166 @@ class EffectorPath:
         return position, rotation
 
 
-Placed = tuple[Any, Any]
-"""A Coal geometry and its transform to the world."""
-
 OwnShape = tuple[Any, FloatArray, FloatArray]
 """A Coal geometry, its rotation and translation in the effector frame."""
 
 
+class Nearness(NamedTuple):
+    """Distances of an effector at n poses to everything it must not touch.
+
+    Attributes:
+        distance: (n,) signed [m]; infinite where it is not below what was asked for.
+        gradient: (n, 3) with respect to the effector's place; zero where the distance is infinite.
+    """
+
+    distance: FloatArray
+    gradient: FloatArray
+
+
+class Clearance(Protocol):
+    """Measures one flying effector."""
+
+    def __call__(
+        self, time: FloatArray, position: FloatArray, rotation: FloatArray, within: ArrayLike = np.inf
+    ) -> Nearness:
+        """Distances at times (n,) [s], places (n, 3) [m] and axes (n, 3, 3); those below ``within`` [m]."""
+        ...
+
+
 class EffectorClearance:
-    """Callable ``(time, pose) -> signed distance [m]`` for one flying effector.
+    """The :class:`Clearance` of one flying effector from the scene and the standing limbs.
 
     Args:
         scene: The obstacles, the floor included.
         standing: Contacts of the other effectors during the flight.
-        towards: Place (3,) [m] that the limb above a standing contact points to at a time [s].
-        bend: Angle of the hanging segment (toes) at a time [rad]; straight when omitted.
+        towards: Places (n, 3), or one, [m] that the limb above a standing contact points to at times [s].
+        bend: Angles (n,) of the hanging segment (toes) at times (n,) [rad]; straight when omitted.
     """
 
     def __init__(
         self, body: BodyModel, scene: Scene, effector: str, standing: Sequence[Contact],
-        towards: Callable[[Contact, float], FloatArray], bend: Callable[[float], float] | None = None,
+        towards: Callable[[Contact, FloatArray], FloatArray],
+        bend: Callable[[FloatArray], FloatArray] | None = None,
     ) -> None:  # fmt: skip
-        self._own, frame = end_shapes(body, effector), body.effector(effector)
-        self._first_bent = len(body.segment(frame.segment).shapes)
+        own, frame = end_shapes(body, effector), body.effector(effector)
         hanging, place = hanging_segment(body, frame.segment), toe_hinge(body, effector)
         axis = None if hanging is None else frame.rotation.T @ hanging.hinges[0].axis
-        self._hinge = None if place is None or axis is None else (place, axis)
-        self._fixed = [
-            (part.geometry, coal.Transform3s(part.rotation, part.translation))
-            for obstacle in scene.obstacles
-            for part in collision_parts(obstacle)
+        self._hinge = None if place is None or axis is None or bend is None else (place, axis, bend)
+        self._first_bent = len(body.segment(frame.segment).shapes)
+        geometries, self._turns, self._offsets = [item[0] for item in own], *_stacked(own)
+        low, high = np.array([local_box(item) for item in geometries]).transpose(1, 0, 2)
+        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+        parts = [part for obstacle in scene.obstacles for part in collision_parts(obstacle)]
+        placed = [
+            (geometry, pose.rotation @ turn, pose.position + pose.rotation @ offset)
+            for contact in standing
+            for pose in [Pose.of(contact)]
+            for geometry, turn, offset in end_shapes(body, contact.effector)
         ]
-        for contact in standing:
-            self._fixed += _placed(end_shapes(body, contact.effector), Pose.of(contact))
         limbs = ((contact, _standing_limb(body, contact)) for contact in standing)
-        self._limbs = [(contact, *limb) for contact, limb in limbs if limb is not None]
-        boxes = [_world_box(geometry, placement) for geometry, placement in self._fixed]
-        self._low, self._high = (np.array([box[side] for box in boxes]).reshape(-1, 3) for side in (0, 1))
-        balls = [_local_box(geometry) for geometry, _, _ in self._own]
-        self._centres = np.array(
-            [offset + turn @ ball[0] for (_, turn, offset), ball in zip(self._own, balls, strict=True)]
+        self._limbs, self._towards = (
+            [(contact, *limb) for contact, limb in limbs if limb is not None],
+            towards,
         )
-        self._radii = np.array([np.linalg.norm(half) for _, half in balls])
-        self._towards, self._bend = towards, bend
-        self._placed_limbs, self._bent = cache(self._limbs_at), cache(self._bent_at)
-        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
+        fixed = [(part.geometry, part.rotation, part.translation) for part in parts] + placed
+        boxes = [(part.low, part.high) for part in parts] + [local_box(item) for item, _, _ in placed]
+        # Axes of the boxes around the fixed shapes, one below the other, and the ends along each of them.
+        rotations, translations = _stacked(fixed)
+        self._axes = np.swapaxes(rotations, 1, 2).reshape(-1, 3)
+        origins = (np.swapaxes(rotations, 1, 2) @ translations[:, :, None]).reshape(-1)
+        self._low, self._high = (origins + np.ravel([box[end] for box in boxes]) for end in (0, 1))
+        others = [item for item, _, _ in placed] + [limb[-1] for limb in self._limbs]
+        self._meters = [
+            [part_meter(mine, part) for part in parts] + [pair_meter(mine, other) for other in others]
+            for mine in geometries
+        ]
+        self._places = [coal.Transform3s(turn, place) for _, turn, place in fixed]
+        self._above = [coal.Transform3s() for _ in self._limbs]
+        self._places += self._above
+        self._moving = [coal.Transform3s() for _ in own]
 
-    def __call__(self, time: float, pose: Pose) -> float:
-        """Return the signed distance at a pose [m]; negative means penetration."""
-        local, slack = self._bent(time)
-        own = _placed(local, pose)
-        smallest = min((self._distance(mine, limb) for limb in self._placed_limbs(time) for mine in own),
-                       default=np.inf)  # fmt: skip
-        # Far obstacles are ruled out by the box around them and the ball around the own shape.
-        centres = pose.position + self._centres @ pose.rotation.T
-        beyond = np.maximum(np.maximum(self._low - centres[:, None], centres[:, None] - self._high), 0.0)
-        lower = np.sqrt(np.einsum("ijk,ijk->ij", beyond, beyond)) - self._radii[:, None] - slack
-        for index in np.argsort(lower, axis=None, kind="stable"):
-            mine, other = divmod(int(index), lower.shape[1])
-            if lower[mine, other] > smallest:
+    def __call__(
+        self, time: FloatArray, position: FloatArray, rotation: FloatArray, within: ArrayLike = np.inf
+    ) -> Nearness:
+        """See :class:`Clearance`."""
+        turns, places = self._own(time, position, rotation)
+        ends = [
+            joint + length * _unit(np.broadcast_to(self._towards(contact, time), position.shape) - joint)
+            for contact, joint, length, _ in self._limbs
+        ]
+        lower = self._lower(turns, places, ends)
+        within = np.broadcast_to(within, time.shape)
+        distance, gradient = np.full(len(time), np.inf), np.zeros((len(time), 3))
+        limbs_near = (
+            lower[:, :, len(self._places) - len(ends) :].min(axis=1, initial=np.inf) < within[:, None]
+        )
+        for row in np.flatnonzero(lower.min(axis=(1, 2), initial=np.inf) < within).tolist():
+            for mine, shape in enumerate(self._moving):
+                shape.setTransform(turns[row, mine], places[row, mine])
+            for number in np.flatnonzero(limbs_near[row]).tolist():
+                joint, along = self._limbs[number][1], ends[number][row] - self._limbs[number][1]
+                self._above[number].setTransform(rotation_from_normal(along), joint + 0.5 * along)
+            distance[row], gradient[row] = self._nearest(lower[row], float(within[row]))
+        return Nearness(distance, gradient)
+
+    def _nearest(self, lower: FloatArray, within: float) -> tuple[float, FloatArray]:
+        """Least distance [m] of the shapes as they are placed, if below ``within``, and its gradient (3,)."""
+        least, gradient = np.inf, np.zeros(3)
+        for index in np.argsort(lower, axis=None, kind="stable").tolist():
+            mine, other = divmod(index, lower.shape[1])
+            if lower[mine, other] >= within:
                 break
-            smallest = min(smallest, self._distance(own[mine], self._fixed[other]))
-        return float(smallest)
+            distance, normal, *_ = self._meters[mine][other](self._moving[mine], self._places[other], within)
+            if distance < within:
+                least, within, gradient = distance, distance, -normal
+        return least, gradient
 
-    def _bent_at(self, time: float) -> tuple[list[OwnShape], float]:
-        """The own shapes, those of the hanging segment bent, and how far that is from straight [m]."""
-        angle = 0.0 if self._bend is None else self._bend(time)
-        if angle == 0.0 or self._hinge is None:
-            return self._own, 0.0
-        place, axis = self._hinge
-        turn = Rotation.from_rotvec(angle * axis).as_matrix()
-        hanging = self._own[self._first_bent :]
-        bent = [(item, turn @ own, place + turn @ (offset - place)) for item, own, offset in hanging]
-        reach = max(2.0 * float(np.linalg.norm(offset - place)) for _, _, offset in hanging)
-        return [*self._own[: self._first_bent], *bent], reach
+    def _own(
+        self, time: FloatArray, position: FloatArray, rotation: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Rotations (n, shapes, 3, 3) and translations (n, shapes, 3) of the own shapes, the toes bent."""
+        turns = np.tile(self._turns, (len(time), 1, 1, 1))
+        offsets = np.tile(self._offsets, (len(time), 1, 1))
+        if self._hinge is not None:
+            place, axis, bend = self._hinge
+            bent = Rotation.from_rotvec(bend(time)[:, None] * axis).as_matrix()[:, None]
+            hanging = slice(self._first_bent, None)
+            turns[:, hanging] = bent @ turns[:, hanging]
+            offsets[:, hanging] = (
+                place + ((offsets[:, hanging] - place)[:, :, None] @ np.swapaxes(bent, 2, 3))[:, :, 0]
+            )
+        placed = position[:, None] + offsets @ np.swapaxes(rotation, 1, 2)
+        return rotation[:, None] @ turns, placed
 
-    def _limbs_at(self, time: float) -> list[Placed]:
-        """Capsules from the joints above the standing effectors to where their limbs point."""
-        placed = []
-        for contact, joint, length, capsule in self._limbs:
-            direction = self._towards(contact, time) - joint
-            direction = direction / max(float(np.linalg.norm(direction)), 1e-9)
-            place = joint + 0.5 * length * direction
-            placed.append((capsule, coal.Transform3s(rotation_from_normal(direction), place)))
-        return placed
+    def _lower(self, turns: FloatArray, places: FloatArray, ends: Sequence[FloatArray]) -> FloatArray:
+        """(n, shapes, others) lower bounds [m] from boxes along the others' axes; minus infinity at 0."""
+        centres = places + (turns @ self._middle[:, :, None])[..., 0]
+        count, shapes = places.shape[:2]
+        middle = centres @ self._axes.T
+        half = (np.abs(self._axes @ turns) @ self._half[:, :, None])[..., 0]
+        beyond = [
+            np.maximum(self._low - middle - half, middle - half - self._high).reshape(count, shapes, -1, 3)
+        ]
+        world = (np.abs(turns) @ self._half[:, :, None])[..., 0]
+        for end, (_, joint, _, capsule) in zip(ends, self._limbs, strict=True):
+            low, high = (extreme(joint, end)[:, None] for extreme in (np.minimum, np.maximum))
+            room = world + capsule.radius
+            beyond.append(np.maximum(low - centres - room, centres - room - high)[:, :, None])
+        gaps = np.maximum(np.concatenate(beyond, axis=2), 0.0)
+        lower = np.sqrt(dot(gaps, gaps))
+        return np.where(lower > 0.0, lower, -np.inf)
 
-    def _distance(self, mine: Placed, other: Placed) -> float:
-        self._result.clear()
-        return coal.distance(*mine, *other, self._request, self._result)
+
+def _stacked(shapes: Sequence[OwnShape]) -> tuple[FloatArray, FloatArray]:
+    """Rotations (k, 3, 3) and translations (k, 3) of shapes."""
+    return (
+        np.array([turn for _, turn, _ in shapes]).reshape(-1, 3, 3),
+        np.array([place for _, _, place in shapes]).reshape(-1, 3),
+    )
 
 
-def _placed(shapes: Sequence[OwnShape], pose: Pose) -> list[Placed]:
-    """An effector's shapes with its frame at a pose."""
-    return [
-        (geometry, coal.Transform3s(pose.rotation @ turn, pose.position + pose.rotation @ offset))
-        for geometry, turn, offset in shapes
-    ]
+def _unit(vectors: FloatArray) -> FloatArray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def end_shapes(body: BodyModel, effector: str) -> list[OwnShape]:
@@ -221,23 +284,6 @@ def end_shapes(body: BodyModel, effector: str) -> list[OwnShape]:
             place = to_frame @ (offset + shape.translation - frame.translation)
             shapes.append((geometries[f"{segment.name}/{shape.name}"], to_frame @ shape.rotation, place))
     return shapes
-
-
-def _local_box(geometry: Any) -> tuple[FloatArray, FloatArray]:
-    """Middle (3,) and half the edges (3,) of the box around a geometry in its own frame [m]."""
-    geometry.computeLocalAABB()
-    low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
-    return 0.5 * (low + high), 0.5 * (high - low)
-
-
-def _world_box(geometry: Any, placement: Any) -> tuple[FloatArray, FloatArray]:
-    """Corners (3,) of an axis-aligned box around a placed geometry [m]; boundless for half-spaces."""
-    if isinstance(geometry, (coal.Halfspace, coal.Plane)):
-        return np.full(3, -1.0e9), np.full(3, 1.0e9)
-    middle, half = _local_box(geometry)
-    rotation = np.array(placement.getRotation())
-    centre, half = rotation @ middle + np.array(placement.getTranslation()), np.abs(rotation) @ half
-    return centre - half, centre + half
 
 
 def _standing_limb(body: BodyModel, contact: Contact) -> tuple[FloatArray, float, Any] | None:

@@ -11,6 +11,7 @@ from functools import cache, cached_property, partial
 from itertools import product
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import end_segments, hangs
@@ -22,9 +23,9 @@ from manikin.planning.whole_body.birrt import Feasible
 from manikin.planning.whole_body.fit_scales import RefineScales
 from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
 from manikin.planning.whole_body.refine_input import KeyPath
-from manikin.planning.whole_body.swing import HEIGHTS, LATERALS, Clearance, SwingLimits, plan_swing
+from manikin.planning.whole_body.swing import HEIGHTS, LATERALS, SwingLimits, plan_swing
 from manikin.planning.whole_body.swing_curve import SwingCurve
-from manikin.planning.whole_body.swing_path import EffectorClearance, Pose
+from manikin.planning.whole_body.swing_path import Clearance, EffectorClearance, Nearness, Pose
 from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing
 from manikin.scene import Proximity, Scene
 
@@ -119,8 +120,8 @@ def _clear_flight(
     given = path.at(times)
     coms = np.array([Configuration(body, q).com for q in given])
 
-    def com(_: Contact, time: float) -> FloatArray:
-        return np.array([np.interp(time, times, column) for column in coms.T])
+    def com(_: Contact, time: FloatArray) -> FloatArray:
+        return np.stack([np.interp(time, times, column) for column in coms.T], axis=-1)
 
     clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
     ends = Pose.of(swing.start), Pose.of(swing.end)
@@ -284,16 +285,13 @@ class FlightPlanner:
 
     def _rolling_clearance(self, swing: Swing, roll: FootRoll) -> Clearance:
         """Clearance of the foot from the pose of the point about which it tilts."""
-        distance = self._clearance(swing, lambda time: float(roll.toe_extension(np.array([time]))[0]))
+        distance = self._clearance(swing, roll.toe_extension)
 
-        @cache
-        def tilt(time: float) -> tuple[FloatArray, FloatArray]:
-            turn, offset = roll.tilt(np.array([time]))
-            return turn[0], offset[0]
-
-        def clearance(time: float, pivot: Pose) -> float:
-            turn, offset = tilt(time)
-            return distance(time, Pose(pivot.position - pivot.rotation @ offset, pivot.rotation @ turn))
+        def clearance(
+            time: FloatArray, position: FloatArray, rotation: FloatArray, within: ArrayLike = np.inf
+        ) -> Nearness:
+            # The foot moves as its pivot does: so does its gradient.
+            return distance(time, *roll.pose(position, rotation, time), within)
 
         return clearance
 
@@ -351,12 +349,16 @@ class FlightPlanner:
         # Toes turn down [rad/m] where the foot is further behind the centre of mass than 0.08 m.
         return float(np.clip(3.0 * (behind - 0.08), 0.0, 0.9))
 
-    def _clearance(self, swing: Swing, bend: Callable[[float], float] | None = None) -> EffectorClearance:
+    def _clearance(
+        self, swing: Swing, bend: Callable[[FloatArray], FloatArray] | None = None
+    ) -> EffectorClearance:
         standing = standing_during(self.schedule, swing)
         towards = self._towards(swing, standing)
         return EffectorClearance(self._body, self._scene, swing.effector, standing, towards, bend)
 
-    def _towards(self, swing: Swing, standing: Sequence[Contact]) -> Callable[[Contact, float], FloatArray]:
+    def _towards(
+        self, swing: Swing, standing: Sequence[Contact]
+    ) -> Callable[[Contact, FloatArray], FloatArray]:
         """Where the limbs above standing contacts point to: to the centre of mass, as legs of who walks do.
 
         A thigh that kneels and a limb on its tip point to where they are hinged in the preferred posture.
@@ -370,11 +372,11 @@ class FlightPlanner:
             if above is not None:
                 hinges[name] = np.array([state.segment_placement(above)[1] for state in states])
 
-        def towards(contact: Contact, time: float) -> FloatArray:
+        def towards(contact: Contact, time: FloatArray) -> FloatArray:
             places = hinges.get(contact.effector)
             if places is None:
                 return self._trajectory.position(time)
-            return np.array([np.interp(time, times, column) for column in places.T])
+            return np.stack([np.interp(time, times, column) for column in places.T], axis=-1)
 
         return towards
 

@@ -14,9 +14,9 @@ import numpy as np
 from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.birrt import Feasible, plan_flight, slow_enough, walk
-from manikin.planning.whole_body.swing import Clearance, SwingLimits, required_clearance
+from manikin.planning.whole_body.swing import SwingLimits, required_clearance
 from manikin.planning.whole_body.swing_curve import SwingCurve
-from manikin.planning.whole_body.swing_path import EffectorPath, Pose
+from manikin.planning.whole_body.swing_path import Clearance, EffectorPath, Pose
 
 CONTROLS, SHARPENINGS = (12, 14, 17, 20, 24, 29, 35, 42, 50, 64, 80), (0, 1, 3)
 """Numbers of control poses that are tried, from the smoothest curve to the closest, and corrections towards
@@ -147,7 +147,7 @@ class ClearFlight:
     """Whether an effector keeps the clearance that swings must keep, less near its two contacts.
 
     Args:
-        clearance: Signed distance of the effector at a time and pose [m].
+        clearance: Of the effector.
         ends: Poses at lift-off and touch-down.
         times: Of both [s].
         limits: Clearance in flight and how it is gained near the contacts.
@@ -159,14 +159,16 @@ class ClearFlight:
         extra: float = 0.0,
     ) -> None:  # fmt: skip
         self._clearance, self._ends = clearance, ends
-        self._at_ends = clearance(times[0], ends[0]), clearance(times[1], ends[1])
+        at_ends = clearance(np.array(times), *(np.array(part) for part in zip(*ends, strict=True)))
+        self._at_ends = at_ends.distance
         self._limits = replace(limits, clearance=limits.clearance + extra)
 
     def __call__(self, time: float, pose: Pose) -> bool:
         """Whether the pose is clear at that time."""
         moved = [np.linalg.norm(pose.position - end.position) for end in self._ends]
-        required = required_clearance((moved[0], moved[1]), self._at_ends, self._limits)
-        return self._clearance(time, pose) >= float(required) - 1e-9
+        required = required_clearance((moved[0], moved[1]), self._at_ends, self._limits) - 1e-9
+        near = self._clearance(np.array([time]), pose.position[None], pose.rotation[None], required)
+        return bool(near.distance[0] >= required)
 
 
 def search_swing(
