@@ -28,7 +28,7 @@ TERMS = {
     "rotation": RotationTerm("right_foot", rotation_from_rpy(0.3, -0.5, 2.0)),
     "com": ComTerm(np.array([0.1, 0.2, 0.9])),
     "com height": ComTerm(np.array([np.nan, np.nan, 0.9])),
-    "upright": UprightTerm("thorax"),
+    "upright": UprightTerm(("thorax", "head")),
     "edge": EdgeTerm(
         "left_foot",
         np.array([0.06, 0.0, 0.0]),

@@ -193,7 +193,7 @@ def test_a_plan_that_cannot_pass_well_inside_a_place_passes_just_inside(ramp, mo
             return replace(planned, trajectory=None, failure=Failure("key plane", "no trajectory found"))
         return search(problem, **options)
 
-    def look(trajectory):
+    def look(trajectory, similar):  # noqa: ARG001
         return KeyPostures((nothing,) if trajectory.position(time)[2] > near[2] else ())
 
     monkeypatch.setattr(key_postures, "plan_com", narrow)

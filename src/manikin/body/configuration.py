@@ -1,7 +1,7 @@
 """One configuration of a body and what follows from it: frames, Jacobians, dynamics."""
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -37,11 +37,11 @@ class Configuration:
         pin.framesForwardKinematics(self.body.pinocchio, self._frames, self.q)
         return self
 
-    # Separate data, because Pinocchio's algorithms overwrite each other's intermediate results; made only
-    # when needed, because making them takes longer than placing the frames.
-    @cached_property
+    # Separate data, because Pinocchio's algorithms overwrite each other's intermediate results; shared by all
+    # states of a body, as making them takes longer than placing frames and each result is copied at once.
+    @property
     def _dynamics(self) -> pin.Data:
-        return self.body.pinocchio.createData()
+        return _scratch(self.body)
 
     def _once(self, key: Any, compute: Callable[[], Any]) -> Any:
         if key not in self._results:
@@ -131,6 +131,12 @@ class Configuration:
         """(nv,) ``h``: Coriolis, centrifugal and gravity forces [N, N.m]."""
         state = self.body.pinocchio, self._dynamics, self.q, self.v
         return self._once("nonlinear_effects", lambda: pin.nonLinearEffects(*state))
+
+
+@lru_cache(maxsize=16)
+def _scratch(body: BodyModel) -> pin.Data:
+    """Data of a body that keep nothing from one call to the next."""
+    return body.pinocchio.createData()
 
 
 def integrate(body: BodyModel, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> FloatArray:

@@ -88,10 +88,21 @@ class LegKinematics:
             ankle: (2, n, 3) the feet's origins [m].
             angles: (n, h) of all hinges; the rotations of the knees are kept [rad].
         """
+        rotation = angles[:, self.slots[:, _KNEE_ROTATION]].T
+        result = angles.copy()
+        result[:, self.slots] = self.bent(pelvis, place, foot, ankle, rotation)[0].transpose(1, 0, 2)
+        return result
+
+    def bent(
+        self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, rotation: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Angles (2, n, 7), and rotations (2, n, 3, 3) of thighs and shanks to the world.
+
+        As :meth:`angles`, with rotations (2, n) of the knees [rad].
+        """
         line = ankle - self.hips(pelvis, place)
         line[1] *= REFLECTION
         pelvis, foot = _reflected(pelvis), _reflect_right(foot)
-        rotation = angles[:, self.slots[:, _KNEE_ROTATION]].T
         size = np.sqrt(dot(line, line))
         reach = np.clip(size, abs(self.thigh - self.shank) + 1e-6, self.length)
         a, b = self.thigh, self.shank
@@ -111,9 +122,7 @@ class LegKinematics:
             np.arctan2(ankle_turn[..., 2, 0], ankle_turn[..., 0, 0]),
             np.arctan2(ankle_turn[..., 1, 2], ankle_turn[..., 1, 1]),
         ], axis=-1)  # fmt: skip
-        result = angles.copy()
-        result[:, self.slots] = legs.transpose(1, 0, 2)
-        return result
+        return legs, _reflect_right(thigh), _reflect_right(shank)
 
 
 def _plane(

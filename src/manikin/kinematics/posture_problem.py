@@ -247,7 +247,9 @@ class PostureProblem:
             names = {segment.name for segment in self.body.segments}
             tilts = {"pelvis": weights.pelvis, "thorax": weights.trunk, "head": weights.head}
             tilts |= {"left_upper_arm": weights.arms, "right_upper_arm": weights.arms}
-            wishes += [(np.full(3, w), UprightTerm(name)) for name, w in tilts.items() if name in names]
+            tilts = {name: weight for name, weight in tilts.items() if name in names}
+            if tilts:
+                wishes.append((np.repeat([*tilts.values()], 3), UprightTerm(tuple(tilts))))
         return tuple(wishes)
 
 

@@ -13,6 +13,7 @@ the smallest changes, so that they end up exact and not merely heavily weighted.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
+from manikin.body.model import BodyModel
 from manikin.errors import BodyError
 from manikin.kinematics.posture_problem import PostureProblem, place_over_contacts, without_one
 from manikin.kinematics.posture_terms import ClearanceTerm, LimitTerm, Linearised
@@ -191,7 +193,7 @@ class PostureSolver:
         wishes = problem.wishes()
         self._wishes = tuple(term for _, term in wishes)
         self._wish_weights = np.concatenate([weight for weight, _ in wishes])
-        self._configuration = Configuration(problem.body, problem.reference)
+        self._configuration = _workspace(problem.body)
         self.iterations = 0
 
     def _moved(self, iterate: _Iterate, step: FloatArray) -> _Iterate:
@@ -327,6 +329,12 @@ class PostureSolver:
         return text
 
 
+@lru_cache(maxsize=16)
+def _workspace(body: BodyModel) -> Configuration:
+    """A state of a body that is always updated before it is used: making one takes as long as a few steps."""
+    return Configuration(body)
+
+
 def _starts(
     problem: PostureProblem, start: ArrayLike | None, settings: SolverSettings
 ) -> Iterator[tuple[FloatArray, bool]]:
@@ -336,7 +344,7 @@ def _starts(
         if not settings.restarts:
             return
     ready = [place_over_contacts(problem, q) for q in _templates(problem, settings)]
-    configuration, terms = Configuration(problem.body), problem.requirements()
+    configuration, terms = _workspace(problem.body), problem.requirements()
 
     def distance(q: FloatArray) -> float:
         return sum(float(np.sum(t.evaluate(configuration.update(q)).residual ** 2)) for t in terms)

@@ -163,18 +163,22 @@ class ComTerm:
 
 @dataclass(frozen=True, eq=False)
 class UprightTerm:
-    """A segment's vertical axis upright: ``r = z - up``, the chord of the tilt.
+    """Vertical axes of segments upright: ``r = z - up`` of each, the chord of the tilt.
 
     Unlike the sine it grows up to the opposite direction, so that a raised arm is drawn down.
     """
 
-    segment: str
+    segments: tuple[str, ...]
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """See :class:`Term`."""
-        rotation, _ = configuration.segment_placement(self.segment)
-        axis = rotation @ UP
-        return Linearised(axis - UP, -skew(axis) @ configuration.segment_jacobian(self.segment)[3:])
+        axes = np.array([configuration.segment_placement(name)[0][:, 2] for name in self.segments])
+        turning = np.array([configuration.segment_jacobian(name)[3:] for name in self.segments])
+        # With the angular velocity w an axis z changes by w x z.
+        x, y, z = axes.T[:, :, None]
+        first, second, third = turning.transpose(1, 0, 2)
+        moving = np.stack([second * z - third * y, third * x - first * z, first * y - second * x], axis=1)
+        return Linearised((axes - UP).ravel(), moving.reshape(-1, moving.shape[-1]))
 
 
 @dataclass(frozen=True, eq=False)

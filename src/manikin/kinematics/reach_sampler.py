@@ -314,14 +314,14 @@ class ReachSampler:
             far = com @ self._normals.T
             violation = self._of_limbs(frames, places)
         else:
-            far = parts.masses.sum() * (place @ self._normals.T) + (turned @ parts.bends.T).max(axis=-1)
+            far = parts.masses.sum() * (place @ self._normals.T) + _farthest(turned, parts.bends)
         if parts.legs is not None:
             legs, beyond = self._legs(x, place, root)
             violation = np.maximum(violation, beyond)
             for side, foot in enumerate(self._feet):
                 if foot is None:
                     far += parts.leg_masses.sum() * (place @ self._normals.T)
-                    far += (turned @ parts.swings[side].T).max(axis=-1)
+                    far += _farthest(turned, parts.swings[side])
                 else:
                     far += legs[side] @ self._normals.T
         return far / parts.body.mass, violation
@@ -347,14 +347,13 @@ class ReachSampler:
                 foot[side], ankle[side] = pelvis, hips[side] - 0.5 * legs.length * pelvis[..., 2]
             else:
                 foot[side], ankle[side] = self._foot(side, contact, x)
-        angles = legs.angles(pelvis, place, foot, ankle, np.zeros((n, len(self._parts.body.joint_names))))
+        angles, thigh, shank = legs.bent(pelvis, place, foot, ankle, np.zeros((2, n)))
         size = np.linalg.norm(ankle - hips, axis=-1)
         violation = np.zeros(n)
         for side, contact in enumerate(self._feet):
             if contact is not None:
-                beyond = self._beyond(angles[:, legs.slots[side]], legs.slots[side])
+                beyond = self._beyond(angles[side], legs.slots[side])
                 violation = np.maximum(violation, np.maximum(beyond, BEYOND * (size[side] - legs.length)))
-        thigh, shank = legs.segments(pelvis, angles)
         if all(contact is not None for contact in self._feet):
             knee = hips - legs.thigh * thigh[..., 2]
             end = knee - legs.shank * shank[..., 2]
@@ -388,6 +387,12 @@ class ReachSampler:
     def _placed(self, contact: LocalContact, x: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
         """Place and axes of a contact, the same for all unknowns or (n, ...)."""
         return contact.position, contact.rotation
+
+
+def _farthest(directions: FloatArray, points: FloatArray) -> FloatArray:
+    """(...) how far the farthest of points (k, 3) is out along directions (..., 3)."""
+    far = points @ directions.reshape(-1, 3).T
+    return far.max(axis=0).reshape(directions.shape[:-1])
 
 
 def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import coal
@@ -24,6 +25,8 @@ STRIDE = 4
 """Samples from one broad phase to the next; between them, shapes move too little for most pairs."""
 SLACK = 1e-5
 """More than a measured distance may be wrong by [m]: ten times Coal's tolerance."""
+WORTHWHILE = 20
+"""Pairs that may be near, more than before, from which on a broad phase costs less than measuring them."""
 WINDOW = 200
 """Neighbouring samples whose lower bounds one measured distance raises."""
 
@@ -168,6 +171,7 @@ class Proximity(BodyPairs):
             for number, part in enumerate(parts)
         }
         self._moving = [coal.Transform3s() for _ in range(self._count)]
+        self._known, self._last_near = KnownDistances(), 0
 
     def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
         """Measure every pair closer than ``activation``, in the order of :attr:`pairs`.
@@ -183,8 +187,7 @@ class Proximity(BodyPairs):
         """
         jacobian = self._jacobian(q)
         placements = self._placements()
-        near = np.flatnonzero((self._lower(placements) < activation) & self._considered(ignore))
-        measured = self._measure(near.tolist(), *_split(placements), activation)
+        near, measured = self._near(placements, activation, self._considered(ignore))
         kept = [row for row, item in enumerate(measured) if item[0] < activation]
         distance = np.array([measured[row][0] for row in kept])
         vectors = (np.array([measured[row][part] for row in kept]).reshape(-1, 3) for part in (1, 2, 3))
@@ -312,6 +315,26 @@ class Proximity(BodyPairs):
         self._reader.read(out)
         return out
 
+    def _near(
+        self, placements: FloatArray, activation: float, considered: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.int64], list[Measured]]:
+        """Pairs that may be near, and what is measured of them.
+
+        As a search moves little from query to query, what was known of the pairs mostly tells which are far.
+        """
+        corners = self._bounds.corners(*_split(placements[None]))
+        known = self._known.lower(self._bounds, corners)
+        lower = self._lower(placements) if known is None else known[0]
+        near = np.flatnonzero((lower < activation) & considered)
+        if known is not None and len(near) > self._last_near + WORTHWHILE:
+            lower = np.maximum(lower, self._lower(placements))
+            near = np.flatnonzero((lower < activation) & considered)
+        measured = self._measure(near.tolist(), *_split(placements), activation)
+        lower[near] = np.array([item[0] for item in measured]) - SLACK
+        self._known.keep(corners, lower[None])
+        self._last_near = len(near)
+        return near, measured
+
     def _lower(self, placements: FloatArray) -> FloatArray:
         return self._bounds.lower(*_split(placements[None]))[0]
 
@@ -379,12 +402,14 @@ def checked_configuration(model: pin.Model, q: FloatArray) -> FloatArray:
 
 def considered(pairs: Sequence[Pair], ignore: Ignored) -> NDArray[np.bool_]:
     """(pairs,) False where a pair, by shape or segment and in either order, is in ``ignore``."""
+    return np.array([ignore.isdisjoint(_names_of(pair)) for pair in pairs], dtype=bool)
 
-    def is_ignored(pair: Pair) -> bool:
-        first, second = ((name, segment_of(name)) for name in pair)
-        return any((a, b) in ignore or (b, a) in ignore for a in first for b in second)
 
-    return np.array([not is_ignored(pair) for pair in pairs], dtype=bool)
+@lru_cache(maxsize=100_000)
+def _names_of(pair: Pair) -> Ignored:
+    """The pair by shapes and segments, in both orders."""
+    first, second = ((name, segment_of(name)) for name in pair)
+    return frozenset(names for a in first for b in second for names in ((a, b), (b, a)))
 
 
 def self_pairs(body: BodyGeometry) -> list[tuple[int, int]]:

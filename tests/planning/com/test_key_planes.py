@@ -33,7 +33,7 @@ def test_a_plan_is_mended_from_the_one_before(planned):
     there = planned.trajectory.position(planned.key_instants[key])
     plane = KeyPlane.towards(key, there, there - np.array([0.02, 0.0, 0.0]))
     problem = replace(planned.problem, key_planes=(plane,))
-    near, afresh = plan_com(problem, guesses=0, near=planned.trajectory), plan_com(problem)
+    near, afresh = plan_com(problem, guesses=0, near=planned), plan_com(problem)
     assert near.succeeded, near.failure
     assert near.d_min == pytest.approx(afresh.d_min, abs=0.1)
     assert near.iterations < afresh.iterations
@@ -68,7 +68,7 @@ def test_a_plane_that_cannot_be_kept_is_the_failure(planned):
     """Half a metre lower than the band of 2 cm allows; looked for from one plan, not from all guesses."""
     there = planned.trajectory.position(planned.key_instants[3])
     plane = KeyPlane.towards(3, there, there - [0.0, 0.0, 0.5])
-    result = plan_com(replace(planned.problem, key_planes=(plane,)), guesses=0, near=planned.trajectory)
+    result = plan_com(replace(planned.problem, key_planes=(plane,)), guesses=0, near=planned)
     assert not result.succeeded
     assert "violated" in result.failure.reason
 

@@ -105,12 +105,12 @@ def _eligible(
     def realise(trajectory: CentroidalTrajectory) -> CentroidalTrajectory | None:
         return _on_real_supports(context, report, trajectory)
 
-    def look(trajectory: CentroidalTrajectory) -> KeyPostures:
+    def look(trajectory: CentroidalTrajectory, similar: KeyPostures | None) -> KeyPostures:
         return find_key_postures(
             context.body, context.scene, trajectory, manner=context.settings.manner,
             requirements=context.settings.requirements, range_margin=range_margin,
             tolerance=tolerance, known=_planned_postures(context, trajectory.schedule),
-            padded=() if context.plan is None else context.padded, ease=replan,
+            padded=() if context.plan is None else context.padded, ease=replan, similar=similar,
         )  # fmt: skip
 
     # Where the body may rest instead, only the way that was found is mended.

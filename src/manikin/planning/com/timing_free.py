@@ -258,7 +258,7 @@ class CentroidalResult(Displayed):
 
 
 def plan_com(
-    problem: CentroidalProblem, *, guesses: int | None = None, near: CentroidalTrajectory | None = None
+    problem: CentroidalProblem, *, guesses: int | None = None, near: CentroidalResult | None = None
 ) -> CentroidalResult:
     """Find control points, key instants and margin of a CoM trajectory ([Qiu2012]_ 5.20-5.28).
 
@@ -268,17 +268,18 @@ def plan_com(
 
     Args:
         guesses: Number of guesses to start from at most; all where None.
-        near: Trajectory on the same supports to start from before any guess.
+        near: Result of a problem that differs in key planes alone, to start from before any guess.
     """
     began = time.perf_counter()
-    polytopes = polytopes_of(problem)
-    feasibility = assess_feasibility(problem, polytopes)
+    polytopes = polytopes_of(problem) if near is None else near.polytopes
+    feasibility = assess_feasibility(problem, polytopes) if near is None else near.feasibility
     attempts: list[Attempt] = []
     failure, best = feasibility.failure, None
     if failure is None and (keys := _resting_keys(problem, polytopes)):
         return _in_parts(problem, polytopes, feasibility, keys)
     if failure is None:
-        known = () if near is None else ((near.spline.bezier_points(), near.schedule.durations),)
+        path = None if near is None else near.trajectory
+        known = () if path is None else ((path.spline.bezier_points(), path.schedule.durations),)
         guessed = (guess(problem, style, polytopes) for style in guess_styles(problem)[:guesses])
         for start in itertools.chain(known, guessed):
             attempts.extend(_rounds(problem, polytopes, *start))

@@ -108,7 +108,7 @@ def find_key_postures(
     body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, *, manner: PostureStyle = READY,
     requirements: WholeBodyRequirements | None = None, range_margin: float = 0.0,
     tolerance: float = SETTINGS.tolerance, known: FloatArray | None = None, padded: Sequence[str] = (),
-    ease: bool = True,
+    ease: bool = True, similar: KeyPostures | None = None,
 ) -> KeyPostures:  # fmt: skip
     """Look for a posture at every key instant until which the trajectory binds.
 
@@ -121,6 +121,7 @@ def find_key_postures(
             posture before and the manner's when omitted.
         padded: Obstacles that any part of the body may lean on.
         ease: Whether postures far from the preferred ones ask for an easier centre of mass.
+        similar: Those of a plan near to this one on the same contacts, from which each search starts.
     """
     schedule = trajectory.schedule
     time = schedule.instants[trajectory.binds(schedule.instants)]
@@ -144,7 +145,11 @@ def find_key_postures(
             self_clearance=clearance, ignore=before[key] | at[key] | leaning, reference=reference,
             preferences=manner.preferences, range_margin=range_margin,
         )  # fmt: skip
-        result = generate_posture(problem, q if known is None else reference, settings=settings)
+        result, near = None, None if similar is None else similar.postures[key]
+        if near is not None and near.found:
+            result = generate_posture(problem, near.q, settings=replace(settings, restarts=False))
+        if result is None or not result.succeeded:
+            result = generate_posture(problem, q if known is None else reference, settings=settings)
         names = (*(contact.effector for contact in contacts), *placements)
         posture = KeyPosture(key, float(time[key]), max(key - 1, 0), names, com[key], result.q)
         if not result.succeeded:
@@ -176,7 +181,8 @@ def _explained(
         wished = replace(problem, com_weight=weight)
         closer = generate_posture(wished, near, settings=replace(settings, restarts=False))
         near = closer.q if closer.succeeded else near
-    again = generate_posture(problem, near, settings=settings)
+    # The other starts have failed before.
+    again = generate_posture(problem, near, settings=replace(settings, restarts=False))
     if again.succeeded:
         return replace(posture, q=again.q)
     com = np.array(Configuration(problem.body, near).com)
@@ -281,9 +287,12 @@ class Eligibility:
     failure: IneligiblePlan | None
 
 
+Look = Callable[[CentroidalTrajectory, KeyPostures | None], KeyPostures]
+
+
 def _with_easier(
     found: Eligibility, realise: Callable[[CentroidalTrajectory], CentroidalTrajectory | None],
-    look: Callable[[CentroidalTrajectory], KeyPostures], guesses: int | None,
+    look: Look, guesses: int | None,
 ) -> Eligibility:  # fmt: skip
     """A plan with easier key postures, where there is one that is hardly slower; else the one found."""
     plan, postures = found.centroidal, found.postures
@@ -297,11 +306,11 @@ def _with_easier(
     if not planes:
         return found
     problem = replace(plan.problem, key_planes=(*plan.problem.key_planes, *planes))
-    again = plan_com(problem, guesses=guesses, near=plan.trajectory)
+    again = plan_com(problem, guesses=guesses, near=plan)
     if again.trajectory is None or again.trajectory.duration > LITTLE_LONGER * plan.trajectory.duration:
         return found
     trajectory = realise(again.trajectory)
-    easier = None if trajectory is None else look(trajectory)
+    easier = None if trajectory is None else look(trajectory, postures)
     if easier is None or easier.failed:
         return found
     return Eligibility(again, trajectory, easier, found.replans, None)
@@ -309,24 +318,24 @@ def _with_easier(
 
 def find_eligible_plan(
     first: CentroidalResult, realise: Callable[[CentroidalTrajectory], CentroidalTrajectory | None],
-    look: Callable[[CentroidalTrajectory], KeyPostures], *, replan: bool = True, guesses: int | None = None,
+    look: Look, *, replan: bool = True, guesses: int | None = None,
 ) -> Eligibility:  # fmt: skip
     """Test a plan at its key instants; plan again, three times at most, with tightened constraints.
 
     Args:
         first: A plan that succeeded.
         realise: Complete a plan (real supports, a seated part); None ends the search.
-        look: Find the key postures of a completed plan.
+        look: Find the key postures of a completed plan, given those of the plan before it.
         replan: Whether its problem may be solved again; a recorded centre of mass is what it is.
         guesses: Guesses that another plan is sought from at most, after the plan before it; all where None.
     """
-    plan, replans = first, 0
+    plan, replans, postures = first, 0, None
     while True:
         assert plan.trajectory is not None  # only plans that succeeded get here
         trajectory = realise(plan.trajectory)
         if trajectory is None:
             return Eligibility(plan, None, None, replans, None)
-        postures = look(trajectory)
+        postures = look(trajectory, postures)
         if not postures.failed:
             found = Eligibility(plan, trajectory, postures, replans, None)
             return _with_easier(found, realise, look, guesses) if replan else found
@@ -345,7 +354,7 @@ def find_eligible_plan(
                     for item in postures.failed if item.nearest_com is not None
                 )  # fmt: skip
                 tightened = replace(plan.problem, key_planes=(*plan.problem.key_planes, *planes))
-                again = plan_com(tightened, guesses=guesses, near=plan.trajectory)
+                again = plan_com(tightened, guesses=guesses, near=plan)
                 if again.failure is None:
                     break
             if again.failure is None:
