@@ -1,13 +1,18 @@
 """The main job where a stage fails; ``benchmarks/sweep_scenarios.py`` runs it with bodies of many sizes."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 
 import manikin
+from manikin.pipeline import runner
 from manikin.pipeline.runner import run
-from manikin.scenarios import load_scenario
+from manikin.pipeline.stages import RunResult
+from manikin.scenarios import Scenario, load_scenario
+from manikin.scenarios.schema import ScenarioFile
+from manikin.scenarios.validation import validate
 
 
 def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
@@ -49,3 +54,22 @@ def test_impossible_walks_and_passages_name_the_cause(name, cause):
     result = manikin.run(name)
     assert not result.succeeded
     assert cause in result.summary["failure"]["reason"]
+
+
+@pytest.mark.parametrize("limit", [300.0, 0.01])
+def test_nothing_else_is_tried_after_the_time_limit(limit, monkeypatch):
+    """A short walk whose motion is made to fail: it is slowed down and other contacts are found, or not."""
+    tried = []
+
+    def fails(context, report, _requirements):
+        tried.append(context)
+        report.fail("wholebody", "made to fail", 0.1, "phase 1")
+        return partial(RunResult.of, report), None
+
+    monkeypatch.setattr(runner, "_planned", fails)
+    task = {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.4, 0.0]}}
+    content = {"name": "ahead", "body": {"stature_m": 1.75}, "task": task, "planning": {"time_limit_s": limit}}
+    failure = run(Scenario(validate(ScenarioFile, content, "ahead"))).summary["failure"]
+    told = f"made to fail; no time was left to try anything else (planning.time_limit_s: {limit:g})"
+    assert failure["reason"] == (told if limit < 1.0 else "made to fail")
+    assert (len(tried) == 1) == (limit < 1.0)

@@ -82,6 +82,7 @@ def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequen
 
 def _follow_the_road(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
     """The whole road; contacts are planned where the scenario lists none, and none for a body that stays."""
+    context = context.timed()
     if context.scenario.file.recovery is not None:
         return RunResult.of(report, recovery=recover_from_push(context, report))
     if context.scenario.file.task.operations is not None:
@@ -104,21 +105,24 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         centroidal = plan_centre_of_mass(with_contacts, report)
         return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
     result, schedule = _planned(with_contacts, report, requirements)
-    while (
+    while with_contacts.has_time and (
         other := slower(with_contacts, report, failed_stage(report.failure, schedule, with_contacts))
-    ) is not None:
+    ):
         with_contacts = other
         result, schedule = _planned(with_contacts, report, requirements)
-    if (rolling := with_rolling_feet(with_contacts, report)) is not None:
+    if with_contacts.has_time and (rolling := with_rolling_feet(with_contacts, report)) is not None:
         again = _planned(rolling, report, requirements)
         result, schedule = (result, schedule) if report.prefer_earlier() else again
     for _ in range(1, context.scenario.contacts.attempts):
         stage = failed_stage(report.failure, schedule, with_contacts)
-        other = None if stage is None else plan_contacts_again(with_contacts, report, stage)
+        tries = stage is not None and with_contacts.has_time
+        other = plan_contacts_again(with_contacts, report, stage) if tries else None
         if other is None:
             break
         with_contacts = other
         result, schedule = _planned(with_contacts, report, requirements)
+    if not with_contacts.has_time:
+        report.tell_end_of_time()
     return result()
 
 
@@ -135,7 +139,7 @@ def _planned(
     if resting is not None and is_hard(context):
         return _refined(resting, report, requirements)
     found = _followed(context, report, requirements)
-    if report.failure is None or resting is None or context.resting is not None:
+    if report.failure is None or resting is None or context.resting is not None or not context.has_time:
         return found
     report.try_again()
     again = _refined(resting, report, requirements)
@@ -152,7 +156,7 @@ def _followed(
     centroidal = plan_centre_of_mass(context, report)
     plan = with_key_postures(context, report, centroidal)
     plan, wholebody = follow_centre_of_mass(context, report, plan)
-    if wholebody is not None and not wholebody.succeeded:
+    if wholebody is not None and not wholebody.succeeded and context.has_time:
         other = with_stricter_key_postures(context, report, centroidal, plan)
         if other is not None:
             plan, wholebody = follow_centre_of_mass(context, report, other)

@@ -1,12 +1,15 @@
 """Work in several processes, by joblib, or on a Dask cluster, and a limit of its processor time."""
 
+import math
 import os
 import signal
 import threading
+import time as clock
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from types import FrameType
@@ -121,6 +124,34 @@ def _alone(work: Callable[[T], R], number: int, item: T) -> tuple[int, R]:
     """Work in a thread of a process that may have more of them, as the only one, on one thread."""
     with _ONE_AT_A_TIME, ThreadpoolController().limit(limits=1):
         return number, work(item)
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """Instant after which nothing else is tried, in processor time of this process.
+
+    Unlike :func:`processor_time_limit` it ends nothing: who can try again asks it first. Results depend on
+    time where it is over alone.
+
+    Attributes:
+        at: Reading of :func:`time.process_time` [s].
+    """
+
+    at: float = math.inf
+
+    @classmethod
+    def after(cls, seconds: float) -> "Deadline":
+        """That in so many seconds from now."""
+        return cls(clock.process_time() + seconds)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its instant has come."""
+        return clock.process_time() >= self.at
+
+
+NO_DEADLINE = Deadline()
+"""The one that never comes."""
 
 
 class _TimeIsUp(BaseException):

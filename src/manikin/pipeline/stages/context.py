@@ -34,6 +34,7 @@ from manikin.planning.whole_body import (
     WholeBodySettings,
 )
 from manikin.planning.whole_body.posture_style import posture_style_of
+from manikin.runtime.parallel import Deadline
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
 from manikin.scenarios.found_supports import Pace
@@ -151,6 +152,16 @@ class RunContext:
     passing: "Passing | None" = None
     start: Stage | None = None
     handling: Handling = FREE_HANDS
+
+    def timed(self) -> "RunContext":
+        """The same with the time limit of its scenario from now on."""
+        deadline = Deadline.after(self.scenario.file.planning.time_limit_s)
+        return replace(self, settings=replace(self.settings, deadline=deadline))
+
+    @property
+    def has_time(self) -> bool:
+        """Whether something else may be tried."""
+        return not self.settings.deadline.is_over
 
     @property
     def resting(self) -> "RunContext | None":
@@ -305,6 +316,13 @@ class Report:
     def fail(self, stage: str, reason: str, time: float = 0.0, where: str = "") -> None:
         """Say why the run is no success; positions in the reason, in the task's frame, move to the world."""
         self.failure = StageFailure(stage, reason_in_world(reason, self.transform), float(time), where)
+
+    def tell_end_of_time(self) -> None:
+        """Add to a failure that the time limit of the run let nothing else be tried."""
+        if self.failure is not None:
+            limit = f"planning.time_limit_s: {self._context.scenario.file.planning.time_limit_s:g}"
+            reason = f"{self.failure.reason}; no time was left to try anything else ({limit})"
+            self.failure = replace(self.failure, reason=reason)
 
     def try_again(self, phase: int | None = None) -> None:
         """Begin again after a failure, which is kept among the refused with the phase it was traced to."""

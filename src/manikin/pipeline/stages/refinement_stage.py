@@ -34,7 +34,10 @@ def refine_contacts(
     rests = _rests(context, schedule)
     keys = KeyPath(time / options.pace, q)
     path = with_mid_flights(body, scene, schedule, keys, padded, dense=bool(rests))
-    kept = {"contact_variables": options.contact_variables, "speed_share": options.speed_share}
+    kept = {
+        "contact_variables": options.contact_variables, "speed_share": options.speed_share,
+        "deadline": context.settings.deadline,
+    }  # fmt: skip
     result = refine_motion(
         body, scene, path.time, path.q, schedule, padded=padded, rests=rests,
         settings=RefineSettings(scales=RefineScales.of(body), **kept),

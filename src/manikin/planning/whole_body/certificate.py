@@ -5,7 +5,7 @@ hands in flight begin and end at distance zero from their supports, which does n
 deep they go into them is measured apart.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -156,16 +156,36 @@ class MotionCertificate(RequirementTable):
         """Whether a part of the body is on the wrong side of another or of an obstacle."""
         return self.value("min_clearance_m") < -CAUGHT
 
+    def excess(self, keys: Collection[str]) -> float:
+        """Sum of how far some requirements are broken, each in units of its limit or of :data:`UNITS`."""
+        return sum(_excess(row) for row in self if row.key in keys)
+
     @property
     def cause(self) -> Requirement | None:
-        """The broken requirement that says why there is no motion: what is caught, else the first one."""
-        return self["min_clearance_m"] if self.is_caught else self.first_broken
+        """The broken requirement that says why there is no motion: what is caught, else what misses most."""
+        if self.is_caught:
+            return self["min_clearance_m"]
+        return max((row for row in self if not row.held), key=_excess, default=None)
 
     @property
     def required(self) -> RequirementTable:
         """The quantities that have a limit here: margins on stances with a volume, contacts met at speed."""
         idle = ("max_meeting_error_m", 0.0), ("min_margin", np.inf)
         return requirement_table(row for row in self if (row.key, row.measured) not in idle)
+
+
+UNITS = MappingProxyType({
+    "min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0,
+    "min_margin": 10.0,
+})  # fmt: skip
+"""Size at which a broken requirement counts as one, where that is not its limit."""
+
+
+def _excess(row: Requirement) -> float:
+    """How far a requirement is broken, in units of its limit or of :data:`UNITS`; 0 where it holds."""
+    if row.held:
+        return 0.0
+    return abs(row.measured - row.limit) / UNITS.get(row.key, max(row.limit, 1e-9))
 
 
 CAUGHT = 0.02
@@ -234,26 +254,26 @@ def _certificate(
     balance: MotionMargin, requirements: WholeBodyRequirements,
 ) -> MotionCertificate:  # fmt: skip
     """The table of series (n,), of worst values with their times [s], and of what any motion is asked."""
+    effectors, joints = schedule.sequence.effectors, body.joint_names
     support, turn = support_errors(body, schedule, motion)
     share = body.torque_share(motion.tau[:, 6:])
-    beyond = np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper)
+    rate = np.abs(motion.v[:, 6:]) / body.velocity_limit
+    beyond = np.maximum(np.maximum(body.lower - motion.q[:, 7:], motion.q[:, 7:] - body.upper), 0.0)
     measured = {
-        **series, "max_support_error_m": support, "max_support_turn_rad": turn,
-        "max_joint_limit_violation_rad": beyond.max(axis=1, initial=0.0),
-        "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
-        "max_torque_share": share.max(axis=1, initial=0.0),
+        "max_support_error_m": (support, effectors), "max_support_turn_rad": (turn, effectors),
+        "max_joint_limit_violation_rad": (beyond, joints), "max_velocity_share": (rate, joints),
+        "max_torque_share": (share, joints),
+        **{key: (values[:, None], ("",)) for key, values in series.items()},
     }  # fmt: skip
-    for key, values in measured.items():
-        worst[key] = float(values.max()), float(motion.time[int(np.argmax(values))])
+    where = {}
+    for key, (values, names) in measured.items():
+        sample, column = divmod(int(np.argmax(values)), len(names)) if values.size else (0, 0)
+        worst[key] = float(values.max(initial=0.0)), float(motion.time[sample])
+        where[key] = names[column] if names else ""
     closest = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     pair = closest.pair or ("", "")
     worst["min_clearance_m"] = float(closest.distance), float(motion.time[closest.sample])
-    farthest = beyond.max(axis=0, initial=0.0)
-    where = {
-        "min_clearance_m": " and ".join(pair),
-        "max_torque_share": body.joint_names[int(np.argmax(share.max(axis=0)))],
-        "max_joint_limit_violation_rad": body.joint_names[int(np.argmax(farthest))] if len(farthest) else "",
-    }
+    where["min_clearance_m"] = " and ".join(pair)
     rows = tuple(
         Requirement(
             key, name, unit, worst[key][0], sense, getattr(requirements, field) if field else np.inf,
@@ -289,14 +309,15 @@ def _impacts(
 def support_errors(
     body: BodyModel, schedule: ContactSchedule, motion: Motion
 ) -> tuple[FloatArray, FloatArray]:
-    """(n,) largest position [m] and orientation [rad] error of the effectors in contact.
+    """(n, c) position [m] and orientation [rad] errors of the effectors in contact, zero of the others.
 
     Of a contact that is still settling, what it is below its surface counts.
     """
     model, data = body.pinocchio, body.pinocchio.createData()
-    position, turn = np.zeros(len(motion.time)), np.zeros(len(motion.time))
+    names = schedule.sequence.effectors
+    position, turn = np.zeros((len(motion.time), len(names))), np.zeros((len(motion.time), len(names)))
     phases = schedule.phase_at(motion.time)
-    settling = {name: schedule.settling(motion.time, name) for name in schedule.sequence.effectors}
+    settling = {name: schedule.settling(motion.time, name) for name in names}
     for k, q in enumerate(motion.q):
         pin.forwardKinematics(model, data, q)
         pin.updateFramePlacements(model, data)
@@ -314,7 +335,8 @@ def support_errors(
                     turned = float(np.linalg.norm(error))
             else:
                 moved = _part_error(body, data, contact)
-            position[k], turn[k] = max(position[k], moved), max(turn[k], turned)
+            own = k, names.index(contact.effector)
+            position[own], turn[own] = moved, turned
     return position, turn
 
 

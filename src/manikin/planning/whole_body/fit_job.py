@@ -20,20 +20,19 @@ from manikin.planning.whole_body.certificate import MotionCertificate
 from manikin.planning.whole_body.fit import DEGREE, FitResult, MotionFit, spline_through
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import MotionScales
+from manikin.runtime.parallel import NO_DEADLINE, Deadline
 from manikin.scene.distance import segment_of
 
 CLEARANCE = frozenset({"min_clearance_m"})
 """Key of the clearance in a certificate."""
 
-UNITS = {"min_clearance_m": 0.01, "max_joint_limit_violation_rad": 0.01, "max_missing_wrench": 10.0}
-"""Size at which a broken requirement counts as one, where that is not its limit."""
-
 FORCES = frozenset({"max_missing_wrench", "max_torque_share"})
 """Keys of the requirements on forces. A first fit does not know the strength, and has sudden momentum."""
 
-MOST_ASTRAY, MUCH_EXCESS, A_LOT = 10.0, 4.0, 0.6
+MOST_ASTRAY, MUCH_EXCESS, A_LOT, UNCHANGED = 10.0, 4.0, 0.6, 0.02
 """Excess, but of forces, of a fit of which no repair is tried: its contacts, or their times, are not the
-body's. Excess above which a repair has to help a lot, and the share of it that it may leave then."""
+body's. Excess above which a repair has to help a lot, and the share of it that it may leave then. Relative
+change of what is missed most by which a repair has moved anything."""
 
 STRONGER, NEARER, LEAST_SAFE_DISTANCE = 0.5, 0.75, 0.014
 """Factor of the scales of what was missed; factor of the wanted clearance where the required one is missed,
@@ -107,22 +106,26 @@ class FitAttempt(Generic[G]):
 
     @property
     def excess(self) -> float:
-        """Sum of how far requirements are broken, each in units of its limit or of :data:`UNITS`."""
-        return self._excess(self.broken)
+        """Sum of how far requirements are broken, see :meth:`.MotionCertificate.excess`."""
+        return self.certificate.excess(self.broken)
 
     @property
     def astray(self) -> float:
         """The excess of all requirements but those on forces."""
-        return self._excess(self.broken - FORCES)
-
-    def _excess(self, broken: frozenset[str]) -> float:
-        rows = [row for row in self.certificate if row.key in broken]
-        return sum(abs(row.measured - row.limit) / UNITS.get(row.key, max(row.limit, 1e-9)) for row in rows)
+        return self.certificate.excess(self.broken - FORCES)
 
     def is_too_near(self, segments: Collection[str]) -> bool:
         """Whether the clearance that is missed is one of these segments'."""
         near = {segment_of(shape) for shape in self.certificate.closest_pair}
         return bool(self.broken & CLEARANCE) and not near.isdisjoint(segments)
+
+    def is_stuck_after(self, before: "FitAttempt[G]") -> bool:
+        """Whether what the attempt before missed most is missed as much again: the fit is at a minimum."""
+        worst = before.certificate.cause
+        if worst is None or worst.key not in self.broken:
+            return False
+        old, new = (item.certificate.excess((worst.key,)) for item in (before, self))
+        return abs(new - old) < UNCHANGED * old
 
     @property
     def is_caught(self) -> bool:
@@ -146,6 +149,7 @@ class FitJob:
         by_count: Whether the attempt that breaks the fewest requirements is the better one, of two alike the
             later, and is gone on from; else the one that misses least.
         span: Key instants from which and to which the splines last; the whole schedule when None.
+        deadline: After which nothing is repaired.
         iterations: Gauss-Newton steps of all fits so far.
     """
 
@@ -157,6 +161,7 @@ class FitJob:
     gives_up: bool = False
     by_count: bool = False
     span: tuple[int, int] | None = None
+    deadline: Deadline = NO_DEADLINE
     iterations: int = 0
 
     def knots(self, schedule: ContactSchedule, fine: int = 0) -> FloatArray:
@@ -219,7 +224,8 @@ class FitJob:
         """
         best, last, vain = first, first, 0
         for number in range(most):
-            if not last.broken or (self.gives_up and last.astray > MOST_ASTRAY):
+            hopeless = self.gives_up and last.astray > MOST_ASTRAY
+            if not last.broken or hopeless or self.deadline.is_over:
                 break
             following = remedy(number, last)
             if following is None:
@@ -227,9 +233,10 @@ class FitJob:
             # A repair is in vain that changes the excess so little, or makes it worse.
             much = following.excess > MUCH_EXCESS
             vain = vain + 1 if following.excess > (A_LOT if much else 1.0) * last.excess else 0
+            ends = following.is_stuck_after(last) or vain > (0 if much else 1)
             last = following
             best = self.better(best, last)
-            if self.gives_up and vain > 0 and (much or vain > 1):
+            if self.gives_up and ends:
                 break
             same = best.goal.schedule.sequence is last.goal.schedule.sequence
             if self.by_count and last.continued and best is not last and same:

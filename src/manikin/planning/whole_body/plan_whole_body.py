@@ -65,6 +65,7 @@ from manikin.planning.whole_body.swing_planner import (
     rolls_on_point,
 )
 from manikin.runtime.display import Displayed
+from manikin.runtime.parallel import NO_DEADLINE, Deadline
 from manikin.runtime.requirement import RequirementTable
 from manikin.scene import Proximity, Scene
 
@@ -101,6 +102,7 @@ class WholeBodySettings:
         guide_spacing: Largest distance of the guide postures [s].
         sampling: Spacing of the finished motion's samples [s].
         manner: How the body carries itself where the task leaves freedom.
+        deadline: After which nothing else is tried.
     """
 
     knot_spacing: float = 0.05
@@ -111,6 +113,7 @@ class WholeBodySettings:
     fit: FitScales = field(default_factory=FitScales)
     requirements: WholeBodyRequirements = field(default_factory=WholeBodyRequirements)
     manner: PostureStyle = READY
+    deadline: Deadline = NO_DEADLINE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -287,7 +290,7 @@ class _Planner:
         )  # fmt: skip
         self.job = FitJob(
             settings.knot_spacing, settings.samples_per_span, sudden=True, penalties=PENALTIES,
-            patience=LATER_DECREASE, gives_up=True,
+            patience=LATER_DECREASE, gives_up=True, deadline=settings.deadline,
         )  # fmt: skip
         self.guide = cache(self._guide)
 
@@ -334,13 +337,15 @@ class _Planner:
         toes = [segment.name for segment in hanging if segment is not None]
         best = self._attempt(swings, manner, progress)
         # Raised arms may have to pass through a thigh, swinging ones through a wall.
-        if manner in (READY, WALKING) and best.is_too_near(frozenset[str]().union(*arms)):
+        raised, late = manner in (READY, WALKING), self.settings.deadline
+        if raised and best.is_too_near(frozenset[str]().union(*arms)) and not late.is_over:
             best = self.job.better(best, self._attempt(swings, CLOSE, progress))
         # Straight toes may be in the way of a flight; those of feet that roll are as the roll has them.
         straight = flat_share(body, self.trajectory.schedule, self.instants[:1]).keys()
-        if straight - self.toes(swings, self.instants[:1]).keys() and best.is_too_near(toes):
+        bends = bool(straight - self.toes(swings, self.instants[:1]).keys())
+        if bends and best.is_too_near(toes) and not late.is_over:
             best = self.job.better(best, self._attempt(swings, manner, progress, straight_toes=False))
-        searched = self._search_again(swings, best)
+        searched = None if late.is_over else self._search_again(swings, best)
         if searched is not None:
             best = self.job.better(best, self._attempt(searched, manner, progress))
         progress(1.0)
@@ -380,7 +385,8 @@ class _Planner:
         ways = (self.known,) if self.waypoints is None else (self.known, self.waypoints)
         for restarts, known in product((False, True), ways):
             quick = self.guide(swings, manner, known, False)
-            if restarts and len(quick.failures) <= 0.1 * len(quick.time):
+            hopeless = restarts and len(quick.failures) <= 0.1 * len(quick.time)
+            if hopeless or (first is not None and self.settings.deadline.is_over):
                 continue
             goal = _Goal(self, swings, self.guide(swings, manner, known, restarts), manner, straight_toes)
             progress(0.4)
@@ -541,6 +547,8 @@ def _with_time(
     if first.succeeded or any(phase.max_duration is not None for phase in phases):
         return planner, first
     for factor in SLOWER:
+        if planner.settings.deadline.is_over:
+            break
         slower = planner.slower(*span, factor)
         part = slower.part(*span, ends)
         other = part.run(part.swings(), began, no_progress)

@@ -59,6 +59,7 @@ from manikin.planning.whole_body.refine_measures import (
 from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
 from manikin.planning.whole_body.refine_physics import contact_slack
 from manikin.runtime.display import Displayed
+from manikin.runtime.parallel import NO_DEADLINE, Deadline
 from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.scene import Proximity, Scene
 
@@ -98,6 +99,7 @@ class RefineSettings:
             are let go; else all contacts of the sequence are held.
         speed_share: Share of the velocity limits up to which phases are shortened, as far as every
             requirement is kept; None leaves them as they are.
+        deadline: After which nothing is repaired or shortened.
     """
 
     knot_spacing: float = 0.1
@@ -110,6 +112,7 @@ class RefineSettings:
     sole_share: float = 0.8
     contact_variables: bool = True
     speed_share: float | None = None
+    deadline: Deadline = NO_DEADLINE
 
     def __post_init__(self) -> None:
         if self.speed_share is not None:
@@ -238,7 +241,7 @@ class Refinement:
         self._job = FitJob(
             # Relative decrease of the objective below which a repair stops.
             settings.knot_spacing, settings.samples_per_span, penalties=PENALTIES, patience=0.004,
-            by_count=True,
+            by_count=True, deadline=settings.deadline,
         )  # fmt: skip
         self._choice = VariableChoice(
             # An effector this near its contact is meant to be there: exactness is for the repairs [m].
@@ -331,7 +334,7 @@ class Refinement:
         for _ in range(ROUNDS):
             goal = best.goal
             factors = shortening(self.body, best.motion, goal.schedule, share, settled)
-            if np.all(factors == 1.0):
+            if np.all(factors == 1.0) or self.settings.deadline.is_over:
                 break
             path, schedule = stretched(goal.path, goal.schedule, factors)
             shorter = replace(goal, path=path, schedule=schedule)

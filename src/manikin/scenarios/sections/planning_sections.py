@@ -284,7 +284,7 @@ class WeightsSection(Section):
 
 
 class PlanningSection(Section):
-    """Options of the centre-of-mass planner; what is left out has the planner's default."""
+    """Options of the centre-of-mass planner, with its defaults, and the time of the run."""
 
     method: Literal["timing-free", "keyframes"] = preset(
         "timing-free", "durations as unknowns, or a smooth path through the key frames of a recording"
@@ -309,6 +309,9 @@ class PlanningSection(Section):
     margin_space: Literal["wrench", "force"] = preset("wrench", "what the margin measures")
     friction_model: FrictionModelName = preset("outer", FRICTION_MODEL_TEXT)
     max_duration_s: Positive | None = optional("longest duration of the motion [s]")
+    time_limit_s: Positive = preset(
+        300.0, "processor time after which nothing else is tried: a run ends with what failed until then [s]"
+    )
     zero_end_accelerations: Annotated[bool, Field(strict=True)] = preset(
         True, "whether the CoM starts and ends without acceleration, as at rest"
     )
