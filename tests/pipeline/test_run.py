@@ -68,7 +68,12 @@ def test_nothing_else_is_tried_after_the_time_limit(limit, monkeypatch):
 
     monkeypatch.setattr(runner, "_planned", fails)
     task = {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.4, 0.0]}}
-    content = {"name": "ahead", "body": {"stature_m": 1.75}, "task": task, "planning": {"time_limit_s": limit}}
+    content = {
+        "name": "ahead",
+        "body": {"stature_m": 1.75},
+        "task": task,
+        "planning": {"time_limit_s": limit},
+    }
     failure = run(Scenario(validate(ScenarioFile, content, "ahead"))).summary["failure"]
     told = f"made to fail; no time was left to try anything else (planning.time_limit_s: {limit:g})"
     assert failure["reason"] == (told if limit < 1.0 else "made to fail")
