@@ -212,7 +212,7 @@ def certify(
         "max_meeting_error_m": sliding_touchdown_errors(proximity, meeting, motion),
         "max_missing_wrench": np.linalg.norm(motion.tau[:, :6], axis=1),
     }
-    worst = {"max_scuff_m": deepest_penetration(body, proximity, schedule, motion, ignored)}
+    worst = {"max_scuff_m": (*deepest_penetration(body, proximity, schedule, motion, ignored), "")}
     stances, phases = [phase.stance for phase in schedule.sequence], schedule.phase_at(motion.time)
     return _certificate(
         body, proximity, schedule, motion, ignored, series, worst,
@@ -238,8 +238,12 @@ def certify_refined(
     lowest = int(np.argmin(margin))
     flying = proximity.minimum_over(motion.q, obstacles.touching(), tolerance=1e-5)
     worst = {
-        "min_margin": (float(margin[lowest]), float(motion.time[lowest])),
-        "max_penetration_m": (max(0.0, -float(flying.distance)), float(motion.time[flying.sample])),
+        "min_margin": (float(margin[lowest]), float(motion.time[lowest]), ""),
+        "max_penetration_m": (
+            max(0.0, -float(flying.distance)),
+            float(motion.time[flying.sample]),
+            " and ".join(flying.pair or ()),
+        ),
     }
     return _certificate(
         body, proximity, schedule, motion, obstacles.during_flights(), {"max_physics_violation": violation},
@@ -250,10 +254,10 @@ def certify_refined(
 
 def _certificate(
     body: BodyModel, proximity: Proximity, schedule: ContactSchedule, motion: Motion,
-    ignored: tuple[Ignored, ...], series: Mapping[str, FloatArray], worst: dict[str, tuple[float, float]],
-    balance: MotionMargin, requirements: WholeBodyRequirements,
+    ignored: tuple[Ignored, ...], series: Mapping[str, FloatArray],
+    worst: dict[str, tuple[float, float, str]], balance: MotionMargin, requirements: WholeBodyRequirements,
 ) -> MotionCertificate:  # fmt: skip
-    """The table of series (n,), of worst values with their times [s], and of what any motion is asked."""
+    """The table of series (n,), of worst values with times [s] and places, and what any motion is asked."""
     effectors, joints = schedule.sequence.effectors, body.joint_names
     support, turn = support_errors(body, schedule, motion)
     share = body.torque_share(motion.tau[:, 6:])
@@ -265,19 +269,20 @@ def _certificate(
         "max_torque_share": (share, joints),
         **{key: (values[:, None], ("",)) for key, values in series.items()},
     }  # fmt: skip
-    where = {}
     for key, (values, names) in measured.items():
-        sample, column = divmod(int(np.argmax(values)), len(names)) if values.size else (0, 0)
-        worst[key] = float(values.max(initial=0.0)), float(motion.time[sample])
-        where[key] = names[column] if names else ""
+        if not values.size:  # without joints
+            worst[key] = 0.0, float(motion.time[0]), ""
+            continue
+        sample, column = divmod(int(np.argmax(values)), len(names))
+        worst[key] = float(values[sample, column]), float(motion.time[sample]), names[column]
     closest = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     pair = closest.pair or ("", "")
-    worst["min_clearance_m"] = float(closest.distance), float(motion.time[closest.sample])
-    where["min_clearance_m"] = " and ".join(pair)
+    when = float(motion.time[closest.sample])
+    worst["min_clearance_m"] = float(closest.distance), when, " and ".join(pair)
     rows = tuple(
         Requirement(
             key, name, unit, worst[key][0], sense, getattr(requirements, field) if field else np.inf,
-            worst[key][1], where.get(key, ""),
+            *worst[key][1:],
         )
         for key, (name, unit, sense, field) in QUANTITIES.items() if key in worst
     )  # fmt: skip

@@ -7,7 +7,7 @@ such change, so that a step along these derivatives shifts its centre of pressur
 between several supports the forces are shared anew now and then (:meth:`.MotionFit.solve`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
 
@@ -34,8 +34,7 @@ class HeldForces:
 
     Attributes:
         joints: (c,) joint that carries each effector.
-        known: (n,) whether the forces supply what the motion needs; not so where a contact made at speed
-            still settles.
+        known: (n,) whether the forces supply what the motion needs.
         wrench: (n, c, 6) force [N] and moment about the world origin [N.m], world axes.
         sharing: (n, c, 6, 6) change of each of these wrenches for one that is missing.
         hinges: (k,) hinges whose torque counts: those that a force does not reach through toes.
@@ -62,16 +61,24 @@ class HeldForces:
         time = np.where(ends, time - 2.0 * AT_KEY, time)
         tau, wrench = plan_forces(body, schedule, time, *states)
         names, phases = schedule.sequence.effectors, schedule.phase_at(time)
-        settling = np.any([schedule.settling(time, name) for name in names], axis=0)
         # Wrench that contact forces may leave unsupplied where they are held [N, N.m].
-        known = ~settling & (np.linalg.norm(tau[:, :6], axis=1) < 1.0)
-        give = np.zeros((*wrench.shape, 6))
+        known = np.linalg.norm(tau[:, :6], axis=1) < 1.0
+        give, data = np.zeros((*wrench.shape, 6)), body.pinocchio.createData()
         for number, phase in enumerate(schedule.sequence):
             for contact in phase.stance:
                 part = phases == number, names.index(contact.effector)
                 wrench[*part, 3:] += np.cross(contact.position, wrench[*part, :3])
                 load = np.linalg.norm(wrench[*part, :3], axis=1)
                 give[part] = load[:, None, None] * compliance(contact)
+                for row in np.flatnonzero((phases == number) & schedule.settling(time, contact.effector)):
+                    pin.forwardKinematics(body.pinocchio, data, states.q[row])
+                    frame = body.effector_frame(contact.effector)
+                    here = pin.updateFramePlacement(body.pinocchio, data, frame)
+                    moved = replace(
+                        contact, position=here.translation, rotation_contact_to_world=here.rotation
+                    )
+                    own = row, names.index(contact.effector)
+                    give[own] = np.linalg.norm(wrench[own][:3]) * compliance(moved)
         # Eigenvalues of the contacts' compliance below this share of the largest give no wrench.
         sharing = give @ np.linalg.pinv(give.sum(axis=1), rcond=1e-10, hermitian=True)[:, None]
         model: pin.Model = body.pinocchio
