@@ -38,7 +38,8 @@ GRASPED = -0.05
 
 
 REACHING = 0.35
-"""Longest time before and after a grasp in which a hand may be at what it holds [s]; executed it is 0.4 s."""
+"""Longest time before and after a contact in which an effector may be at what it leaves or reaches [s]: in
+the last third of a slow flight a foot is not above its place yet. Executed it is 0.4 s for a hand."""
 
 
 class RefineObstacles:
@@ -78,8 +79,8 @@ class RefineObstacles:
                 if contact is not None:
                     grasped = contact.kind is ContactKind.GRASP
                     # Share of a flight in which the wanted clearance to what was left, or is to be reached,
-                    # rises or falls; of a hand that was free for long it is the end.
-                    ramp = min(0.3 * (end - start), REACHING if grasped else np.inf)
+                    # rises or falls.
+                    ramp = min(0.3 * (end - start), REACHING)
                     share = np.clip(gone / ramp, 0.0, 1.0)
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
                     self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
