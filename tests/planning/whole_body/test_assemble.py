@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human
-from manikin.contact import Phase, Stance, StanceSequence, sole
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.kinematics.com_reach import ComReach
 from manikin.planning.com import CentroidalProblem, Weights, plan_com
 from manikin.planning.whole_body import (
@@ -416,3 +416,24 @@ def test_the_certificate_names_the_contact_that_is_missed(step_motion, person, s
     assert turn.max(axis=0)[names.index("left_foot")] < 1.0e-3
     assert step_motion.certificate["max_support_error_m"].where in names
     assert position.shape == (len(q), len(names))
+
+
+def test_knots_are_doubled_where_a_contact_is_missed_also_far_from_key_instants(step_attempt, step_com):
+    """Contacts are constraints at knots; what is missed between two of them needs more, at any timing."""
+    attempt = blocked(step_attempt, "max_support_error_m", 1.8e-3)  # at 0.6 s
+    fine, schedule, job = (
+        attempt.finer({"max_support_error_m", "max_com_error_m"}),
+        step_com.schedule,
+        FitJob(0.1),
+    )
+    assert np.abs(schedule.instants - 0.6).min() > 0.1
+    assert attempt.finer({"max_com_error_m"}) == ()
+    for slower in (1.0, 1.5):
+        later = ContactSchedule(schedule.sequence, slower * schedule.instants)
+        plain, dense = (np.unique(job.knots(later, places)) for places in ((), fine))
+        assert set(plain) <= set(dense)
+        at = slower * 0.6
+        widest = [np.diff(knots)[np.searchsorted(knots, at) - 1] for knots in (plain, dense)]
+        assert widest[1] == pytest.approx(0.5 * widest[0])
+        far = np.abs(dense[:, None] - [*later.instants, at]).min(axis=1) > 0.2
+        assert set(dense[far]) <= set(plain)

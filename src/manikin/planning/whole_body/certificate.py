@@ -163,9 +163,11 @@ class MotionCertificate(RequirementTable):
     @property
     def cause(self) -> Requirement | None:
         """The broken requirement that says why there is no motion: what is caught, else what misses most."""
-        if self.is_caught:
-            return self["min_clearance_m"]
-        return max((row for row in self if not row.held), key=_excess, default=None)
+        return self["min_clearance_m"] if self.is_caught else self.worst(self.broken)
+
+    def worst(self, keys: Collection[str]) -> Requirement | None:
+        """The requirement that misses most of some; None where none of them is broken."""
+        return max((row for row in self if row.key in keys and not row.held), key=_excess, default=None)
 
     @property
     def required(self) -> RequirementTable:

@@ -44,6 +44,9 @@ SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09,
 CLOSEST_KNOTS = 4.0e-3
 """Knots closer than this are one [s]."""
 
+Places = tuple[float, ...]
+"""Instants as phases with the share of them that is over: they stay where phases last longer."""
+
 S = TypeVar("S", bound=MotionScales)
 
 Progress = Callable[[float], None]
@@ -84,7 +87,7 @@ class FitAttempt(Generic[G]):
     """One fit with its measured motion.
 
     Attributes:
-        fine: How often the knots near the key instants were doubled.
+        fine: Where the knots were doubled, once for each place and near the key instants as well.
         continued: Whether it went on from an earlier spline.
         fit: The solver, with its multipliers and damping.
         certificate: Measured on them, beside its limits.
@@ -92,7 +95,7 @@ class FitAttempt(Generic[G]):
 
     goal: G
     scales: MotionScales
-    fine: int
+    fine: Places
     continued: bool
     fit: MotionFit
     result: FitResult
@@ -118,6 +121,14 @@ class FitAttempt(Generic[G]):
         """Whether the clearance that is missed is one of these segments'."""
         near = {segment_of(shape) for shape in self.certificate.closest_pair}
         return bool(self.broken & CLEARANCE) and not near.isdisjoint(segments)
+
+    def finer(self, keys: Collection[str]) -> Places:
+        """:attr:`fine` with the place where most is missed of some requirements that are broken."""
+        worst = self.certificate.worst(keys)
+        if worst is None:
+            return self.fine
+        instants = self.goal.schedule.instants
+        return (*self.fine, float(np.interp(worst.time_s or 0.0, instants, np.arange(len(instants)))))
 
     def is_stuck_after(self, before: "FitAttempt[G]") -> bool:
         """Whether what the attempt before missed most is missed as much again: the fit is at a minimum."""
@@ -164,14 +175,14 @@ class FitJob:
     deadline: Deadline = NO_DEADLINE
     iterations: int = 0
 
-    def knots(self, schedule: ContactSchedule, fine: int = 0) -> FloatArray:
-        """Clamped knots [s] for contacts in time, those near the key instants doubled ``fine`` times."""
+    def knots(self, schedule: ContactSchedule, fine: Places = ()) -> FloatArray:
+        """Clamped knots [s] for contacts in time, doubled near some places, see :class:`FitAttempt`."""
         sudden = touch_downs_at_speed(schedule) if self.sudden else ()
         first, last = self.span or (0, len(schedule.sequence))
         instants = schedule.instants[first : last + 1]
         knots = phase_knots(instants, self.knot_spacing, sudden)
-        for _ in range(fine):
-            knots = refined(knots, instants)
+        for when in np.interp(fine, np.arange(len(schedule.instants)), schedule.instants):
+            knots = refined(knots, np.append(instants, when))
         return knots
 
     def samples(self, knots: FloatArray) -> tuple[FloatArray, SampledBasis]:
@@ -180,7 +191,11 @@ class FitJob:
         return time, SampledBasis.at(time, knots, DEGREE)
 
     def solve(
-        self, goal: FitGoal, scales: MotionScales, fine: int = 0, near: ConfigurationSpline | None = None
+        self,
+        goal: FitGoal,
+        scales: MotionScales,
+        fine: Places = (),
+        near: ConfigurationSpline | None = None,
     ) -> tuple[MotionFit, FitResult]:
         """Fit a spline, from the objective's reference or from an earlier spline."""
         knots = self.knots(goal.schedule, fine)
@@ -195,12 +210,16 @@ class FitJob:
         return fit, fit.solve(start, scales, further=near is not None)
 
     def attempt(
-        self, goal: G, scales: MotionScales, fine: int = 0, near: ConfigurationSpline | None = None
+        self,
+        goal: G,
+        scales: MotionScales,
+        fine: Places = (),
+        near: ConfigurationSpline | None = None,
     ) -> FitAttempt[G]:
         """Fit a spline as :meth:`solve` does, and measure it."""
         return self._measured(goal, scales, fine, near is not None, *self.solve(goal, scales, fine, near))
 
-    def restart(self, last: FitAttempt[G], fine: int = 0) -> FitAttempt[G]:
+    def restart(self, last: FitAttempt[G], fine: Places = ()) -> FitAttempt[G]:
         """Begin again from the first guess, with more weight on clearance."""
         return self.attempt(last.goal, self.updated(last.scales, last.broken & CLEARANCE), fine)
 
@@ -259,7 +278,13 @@ class FitJob:
         return replace(scales, **smaller, decrease=self.patience)
 
     def _measured(
-        self, goal: G, scales: MotionScales, fine: int, continued: bool, fit: MotionFit, result: FitResult
+        self,
+        goal: G,
+        scales: MotionScales,
+        fine: Places,
+        continued: bool,
+        fit: MotionFit,
+        result: FitResult,
     ) -> FitAttempt[G]:
         self.iterations += result.iterations
         return FitAttempt(goal, scales, fine, continued, fit, result, *goal.measure(result.spline))

@@ -404,7 +404,7 @@ class _Planner:
         goal, broken = last.goal, last.broken
         if last.is_caught:  # Fits that follow may have the finer knots again.
             return replace(self.job.restart(last), fine=last.fine)
-        if last.fine > 0 and broken & INEXACT:
+        if last.fine and broken & INEXACT:
             return None
         inexact, weak = bool(broken & INEXACT), "max_torque_share" in broken
         if weak:  # where a contact made at speed still settles, only the momentum decides the torques
@@ -415,7 +415,7 @@ class _Planner:
         if weak:
             scales = replace(scales, strength_share=scales.strength_share - STRENGTH_STEP)
         if inexact:
-            return self.job.attempt(goal, scales, 1, last.result.spline)
+            return self.job.attempt(goal, scales, last.finer(INEXACT), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
 
     def _guide(

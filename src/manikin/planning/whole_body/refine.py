@@ -317,8 +317,10 @@ class Refinement:
         # Weights may find the strength; where they do not, time does.
         waits = weak and number < 2
         slower = number > 0 and self.settings.retime and not waits and bool(broken & _SLOWED.keys())
+        if len(last.fine) == 2 and broken <= _EXACT:  # is out of reach
+            return None
         # How often the spline's knots near the key instants are doubled at most.
-        fine = last.fine + (last.fine < 2 and bool(broken & _EXACT))
+        fine = last.finer(_EXACT) if len(last.fine) < 2 else last.fine
         if not slower and fine == last.fine:
             return job.improve(last, scales)
         near = last.result.spline
