@@ -191,12 +191,9 @@ class FitJob:
         return time, SampledBasis.at(time, knots, DEGREE)
 
     def solve(
-        self,
-        goal: FitGoal,
-        scales: MotionScales,
-        fine: Places = (),
+        self, goal: FitGoal, scales: MotionScales, fine: Places = (),
         near: ConfigurationSpline | None = None,
-    ) -> tuple[MotionFit, FitResult]:
+    ) -> tuple[MotionFit, FitResult]:  # fmt: skip
         """Fit a spline, from the objective's reference or from an earlier spline."""
         knots = self.knots(goal.schedule, fine)
         time, basis = self.samples(knots)
@@ -210,11 +207,7 @@ class FitJob:
         return fit, fit.solve(start, scales, further=near is not None)
 
     def attempt(
-        self,
-        goal: G,
-        scales: MotionScales,
-        fine: Places = (),
-        near: ConfigurationSpline | None = None,
+        self, goal: G, scales: MotionScales, fine: Places = (), near: ConfigurationSpline | None = None
     ) -> FitAttempt[G]:
         """Fit a spline as :meth:`solve` does, and measure it."""
         return self._measured(goal, scales, fine, near is not None, *self.solve(goal, scales, fine, near))
@@ -278,13 +271,7 @@ class FitJob:
         return replace(scales, **smaller, decrease=self.patience)
 
     def _measured(
-        self,
-        goal: G,
-        scales: MotionScales,
-        fine: Places,
-        continued: bool,
-        fit: MotionFit,
-        result: FitResult,
+        self, goal: G, scales: MotionScales, fine: Places, continued: bool, fit: MotionFit, result: FitResult
     ) -> FitAttempt[G]:
         self.iterations += result.iterations
         return FitAttempt(goal, scales, fine, continued, fit, result, *goal.measure(result.spline))
