@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from manikin.body import human
 from manikin.contact import ContactSchedule
 from manikin.pipeline.runner import run
 from manikin.planning.com import plan_com
@@ -12,8 +13,8 @@ from manikin.planning.com.transcription import transcribe
 from manikin.planning.whole_body import WholeBodySettings, plan_whole_body
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios import load_scenario
-from manikin.scenarios.planned import walk_before, walking_supports
-from manikin.walking import place_footprints, walking_path
+from manikin.walking import step_along, walking_path
+from manikin.walking.gait.balanced_walk import balanced_walk
 
 
 @pytest.fixture(scope="module", params=["walk", "walk@flat"])
@@ -47,26 +48,19 @@ def test_everything(benchmark, scenario):
     assert result.succeeded
 
 
-@pytest.fixture(scope="module", params=["straight", "around", "to the platform"])
-def walked(request):
-    """Scenarios on footprints: 3 m in 8 steps, a quarter turn in 11, 4 m and three steps more in 13."""
-    if request.param == "to the platform":
-        path = walking_path((0, -4, np.pi / 2), (0, 0, np.pi / 2), max_speed=0.6)
-        return walk_before(place_footprints(path, first="right_foot"), load_scenario("platform"))
-    goal = {"straight": (3.0, 0.0, 0.0), "around": (2.0, 2.0, np.pi / 2)}[request.param]
-    return walking_supports(
-        place_footprints(walking_path((0, 0, 0), goal, max_speed=0.6)), load_scenario("walk")
-    )
+GOALS = {"straight": (3.0, 0.0, 0.0), "around": (2.0, 2.0, np.pi / 2), "behind": (-1.0, 1.0, 2.6)}
 
 
-def test_walk_on_footprints_com(benchmark, walked):
-    """The CoM of a long walk, cold; the motions last 8 to 12 s."""
-    problem = walked.build_centroidal_problem()
-    result = benchmark.pedantic(plan_com, (problem,), setup=transcribe.cache_clear, rounds=3)
-    assert result.succeeded
+@pytest.mark.parametrize("name", GOALS)
+def test_walk_in_balance(benchmark, name):
+    """Steps and the whole body in balance on them, without the path and the execution."""
+    path = walking_path((0, 0, 0), GOALS[name], max_speed=1.2)
+    walk = benchmark.pedantic(lambda: balanced_walk(human(), step_along(path)), rounds=3, iterations=1)
+    assert walk.missed < 1e-3
 
 
-def test_walk_on_footprints(benchmark, walked):
+@pytest.mark.parametrize("name", ["stroll", "stroll@behind"])
+def test_executed_walk(benchmark, name):
     """All stages with the execution, without files and figures."""
-    result = benchmark.pedantic(lambda: run(walked), rounds=2, iterations=1)
+    result = benchmark.pedantic(lambda: run(name), rounds=2, iterations=1)
     assert result.succeeded

@@ -38,7 +38,7 @@ settings.load_profile("standard")
 APART = frozenset({
     "tests/pipeline/test_beam.py", "tests/pipeline/test_key_postures.py",
     "tests/pipeline/test_limb_contacts.py", "tests/pipeline/test_pushed_moving.py",
-    "tests/pipeline/test_run.py", "tests/pipeline/test_walked.py", "tests/simulation/test_push_map_holds.py",
+    "tests/pipeline/test_run.py", "tests/simulation/test_push_map_holds.py",
     "tests/test_readme.py",
 })  # fmt: skip
 """Modules of long tests that share no results, but for those with the same parameters."""
@@ -99,10 +99,11 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 SHORTER = {
+    "goal-left": ("walking.whole_body=recorded",),
     "crouch": ("scene.0.box=[0.3, 3.0, 0.3]", "task.start.at=[0.75, 0.0]", "task.goal.at=[1.65, 0.0]"),
     "walk-and-platform": ("walking.start.at=[0.0, -1.2]",),
 }
-"""Shorter ways through scenarios: a slab that is less deep, and fewer steps before and after it."""
+"""Shorter ways through scenarios: no execution, a slab that is less deep, fewer steps before and after it."""
 
 QUICKLY = "planning.max_duration_s=2.6"
 """Time for :meth:`Runs.step` that leaves it a good margin [s]; the file has 4 s."""

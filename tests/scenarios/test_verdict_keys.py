@@ -56,7 +56,10 @@ def test_trials_may_be_asked_for_and_set(tmp_path):
             "uncertainty.mass_share is 1.5; valid: 0 to 0.9",
         ),
         ("extends: walls\nname: mine\nexecution: required\n", "valid: none for a point mass"),
-        ("extends: goal-left\nname: mine\nexecution: required\n", "valid: none for a recorded walk"),
+        (
+            "extends: goal-left\nname: mine\nexecution: required\nwalking: {whole_body: recorded}\n",
+            "valid: none for a recorded walk",
+        ),
         ("extends: push-right-200\nname: mine\nexecution: none\n", "valid: required beside recovery"),
         ("extends: platform\nname: mine\nexpect: perhaps\n", "'success' or 'failure'"),
         (

@@ -131,6 +131,30 @@ class Motion(Displayed):
             columns |= {f"{name}_touches": self.support[:, k]} | forces
         return DataFrame(columns, index=Index(self.time, name="time_s"))
 
+    def then(self, after: "Motion") -> "Motion":
+        """Two motions of one body, of which the second begins where this one ends, as one.
+
+        MotionFileError if they have other joints or another unit of the margin.
+        """
+        if (self.joint_names, self.margin_unit) != (after.joint_names, after.margin_unit):
+            raise MotionFileError("motions that follow each other differ; valid: same joints, same margins")
+        names = (*self.contact_names, *(n for n in after.contact_names if n not in self.contact_names))
+        first, second = ({
+            **one.arrays(), "support": one._of_contacts(names, one.support),
+            "contact_force": one._of_contacts(names, one.contact_force),
+        } for one in (self, after))  # fmt: skip
+        second["time"] = second["time"] + (self.time[-1] - after.time[0])
+        joined = {name: np.concatenate([array[:-1], second[name]]) for name, array in first.items()}
+        return Motion(
+            **joined, contact_names=names, joint_names=self.joint_names, margin_unit=self.margin_unit
+        )
+
+    def _of_contacts(self, names: tuple[str, ...], values: NDArray) -> NDArray:
+        """(n, c, ...) values of contacts for more of them, 0 of those that the motion has not."""
+        found = np.zeros((len(values), len(names), *values.shape[2:]), dtype=values.dtype)
+        found[:, [names.index(name) for name in self.contact_names]] = values
+        return found
+
     def arrays(self) -> dict[str, NDArray]:
         """The array fields by name, in their order of declaration."""
         values = ((f.name, getattr(self, f.name)) for f in fields(self))

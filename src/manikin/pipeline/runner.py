@@ -25,8 +25,13 @@ from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, e
 from manikin.pipeline.stages.operation_stage import run_operations
 from manikin.pipeline.stages.recovery_stage import recover_from_push
 from manikin.pipeline.stages.refinement_stage import from_rest_to_rest, is_hard, refine_contacts
-from manikin.pipeline.stages.walking_execution import walk_in_balance
-from manikin.pipeline.stages.walking_stage import walk_on_footprints, walk_to_goal
+from manikin.pipeline.stages.walking_execution import (
+    walk_before,
+    walk_in_balance,
+    walked_requirements,
+    way_before,
+)
+from manikin.pipeline.stages.walking_stage import walk_to_goal, ways_found
 from manikin.pipeline.stages.whole_body_stage import (
     follow_centre_of_mass,
     move_point_mass,
@@ -88,16 +93,13 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     if context.scenario.file.task.operations is not None:
         return run_operations(context, report, requirements, _follow_the_road)
     walking = context.scenario.file.walking
-    if walking is not None and not walking.is_planned(context.scenario.file.supports):
+    if walking is not None and walking.whole_body == "recorded":
         return RunResult.of(report, planned=walk_to_goal(context, report))
-    if walking is not None and walking.whole_body == "balanced":
+    if walking is not None and context.scenario.file.supports is None:
         walk = walk_in_balance(context, report, requirements)
         return RunResult.of(report, execution=walk.execution, planned=walk.planned)
-    if walking is not None:
-        on_footprints = walk_on_footprints(context, report)
-        if on_footprints is None:
-            return RunResult.of(report)
-        context = on_footprints
+    if walking is not None and not ways_found(report, way_before(context)[0]):
+        return RunResult.of(report)
     with_contacts = context if context.scenario.file.supports is not None else plan_contacts(context, report)
     if with_contacts is None:
         return RunResult.of(report)
@@ -163,11 +165,12 @@ def _followed(
     schedule = None if plan.trajectory is None else plan.trajectory.schedule
     if schedule is None or wholebody is None or not wholebody.succeeded:
         return partial(RunResult.of, report, plan.centroidal, wholebody), schedule
-    planned = append_act(context, report, PlannedMotion(schedule, wholebody.motion))
+    planned = walk_before(context, report, PlannedMotion(schedule, wholebody.motion))
+    planned = append_act(context, report, planned)
     wholebody = replace(wholebody, motion=planned.motion)
     if report.failure is not None or not context.scenario.execution_required:
         return partial(RunResult.of, report, plan.centroidal, wholebody), schedule
-    execution = execute_motion(context, report, planned, requirements)
+    execution = execute_motion(context, report, planned, walked_requirements(context, requirements))
     report.judge()
     return partial(RunResult.of, report, plan.centroidal, wholebody, execution), schedule
 
@@ -207,8 +210,8 @@ def _refined(
         schedule = plan.trajectory.schedule
         keys = schedule.instants, np.array([item.q for item in plan.postures.postures])
     refined, execution = refine_contacts(context, report, schedule, *keys), None
-    if refined.succeeded and context.scenario.execution_required:
-        planned = PlannedMotion(refined.schedule, refined.motion)
-        execution = execute_motion(context, report, planned, requirements)
+    planned = walk_before(context, report, PlannedMotion(refined.schedule, refined.motion))
+    if report.failure is None and refined.succeeded and context.scenario.execution_required:
+        execution = execute_motion(context, report, planned, walked_requirements(context, requirements))
         report.judge()
     return partial(RunResult.of, report, centroidal, refined, execution), refined.schedule

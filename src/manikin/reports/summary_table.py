@@ -114,9 +114,10 @@ def about_line(summary: Mapping[str, Any]) -> str:
     """Body, duration of the motion, and computing time."""
     stature, mass = summary["stature_m"], summary["mass_kg"]
     who = f"body of {mass:g} kg" if stature is None else f"person of {stature:g} m and {mass:g} kg"
-    known = [summary[stage] or {} for stage in ("wholebody", "centroidal", "walk")]
-    duration = next((block["duration_s"] for block in known if block.get("duration_s")), None)
-    lasts = "" if duration is None else f", motion of {duration:.2f} s"
+    known = [summary[stage] or {} for stage in ("wholebody", "centroidal")]
+    planned = next((block["duration_s"] for block in known if block.get("duration_s")), 0.0)
+    duration = planned + (summary["walk"] or {}).get("motion_s", 0.0)
+    lasts = f", motion of {duration:.2f} s" if duration else ""
     return f"{who}{lasts}, computed in {summary['wall_s']:.1f} s, seed {summary['seed']}"
 
 

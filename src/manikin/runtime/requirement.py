@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 Sense = Literal["<=", ">=", ">"]
@@ -78,6 +78,13 @@ class RequirementTable:
     def value(self, key: str) -> float:
         """Measured value of a requirement [its unit]."""
         return self[key].measured
+
+    def later(self, delay: float) -> "RequirementTable":
+        """The same, of a result that begins later by ``delay`` [s]."""
+        times = [None if row.time_s is None else row.time_s + delay for row in self.rows]
+        return RequirementTable(
+            tuple(replace(row, time_s=time) for row, time in zip(self.rows, times, strict=True))
+        )
 
     @property
     def held(self) -> bool:

@@ -19,7 +19,6 @@ from manikin.balance.capturability import MARGIN as RISING_MARGIN
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import yaw_about_normal
 from manikin.planning.contacts import ContactPlan, Footholds, Stage, rising_times
-from manikin.scenarios.planned import STANDING, STATURE, WEIGHTS, walk_margin
 from manikin.scenarios.problems import overhead_constraints
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.values import ScenarioValues, build_body
@@ -41,6 +40,15 @@ HIGHEST = 10.0
 """Height above the lowest posture that no centre of mass reaches [m]."""
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
+STATURE = 1.75
+"""Stature of the body that the lengths here are for [m]."""
+STANDING = 0.3
+"""Least duration of the first and the last support [s]."""
+WEIGHTS: Mapping[str, Any] = {
+    "margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0],
+}  # fmt: skip
+"""Of the planner of the centre of mass."""
+
 PLANNING: Mapping[str, Any] = {"degree": 5, "weights": WEIGHTS}
 """Options of the planner of a body on its feet, where the file keeps the defaults; our choice."""
 PLANNING_CRAWLING: Mapping[str, Any] = {"degree": 5, "weights": WEIGHTS | {"duration": 20.0}}
@@ -340,7 +348,7 @@ class _Supports:
         if given != type(given)():
             return given.model_dump(mode="json", exclude_none=True)
         if any(self.passed):
-            walking = {**PLANNING_WALKING, "min_margin": walk_margin(self.scenario, WALKING_MARGIN)}
+            walking = {**PLANNING_WALKING, "min_margin": walk_margin(self.scenario)}
             return {**walking, **PLANNING_SITTING} if self._sits else walking
         if self._sits or self._rises:
             return PLANNING_SITTING if self._sits else PLANNING_RISING
@@ -414,3 +422,10 @@ def _below_postures(plan: ContactPlan) -> dict[str, str]:
     start = float(level - coms[0, 0] * x - coms[0, 1] * y)
     line = f"{start:.4f} + {x:.4f}*x + {y:.4f}*y"
     return {"lower": f"{float(coms[:, 2].min()) - LOWEST:.4f}", "upper": line.replace("+ -", "- ")}
+
+
+def walk_margin(scenario: Scenario) -> float:
+    """The margin of a body that walks, for the one that the scenario's own margin is for [N.m]."""
+    mass = scenario.file.reference_mass_kg or scenario.mass
+    stature = scenario.file.reference_stature_m or scenario.file.body.stature_m
+    return WALKING_MARGIN * mass / 70.0 * stature / STATURE

@@ -198,7 +198,7 @@ class ScenarioFile(Section):
     def _check_execution(self) -> None:
         """Refuse an execution of what cannot be executed, and none of what is nothing else."""
         if self.execution.required:
-            recorded = self.walking is not None and not self.walking.is_planned(self.supports)
+            recorded = self.walking is not None and self.walking.whole_body == "recorded"
             problem = "is required; valid: none for"
             point_mass = self.body.model == "point_mass"
             refuse_if(point_mass, "execution", f"{problem} a point mass, which has no joints")
@@ -243,20 +243,13 @@ class ScenarioFile(Section):
             raise self._inapplicable("walking")
         if floor is None:
             raise refuse("floor_height_m", "is null; valid in a walk: the height of a floor")
-        planned, alone = walking.is_planned(self.supports), self.supports is None
-        others = ("contacts", "recovery", *(() if planned else ("push",)))
+        recorded, alone = walking.whole_body == "recorded", self.supports is None
+        others = ("contacts", "recovery", *(("push",) if recorded else ()))
         self._refuse_given(others, "is given beside walking; valid: one of them")
         problem = "goes with supports, which it leads to; valid: both or neither"
         refuse_if(alone != (walking.start is None), "walking.start", problem)
-        for key in ("via", "others", "wait_s") if planned else ():
-            if value := getattr(walking, key):
-                given = f"is {value:g}" if key == "wait_s" else "are given"
-                raise refuse(f"walking.{key}", f"{given} in a planned walk; valid there: leave it out")
-        if walking.whole_body == "balanced" and not alone:
-            raise refuse("walking.whole_body", "is balanced; valid before supports: planned, or leave it out")
-        if walking.footprints == "library" and not (alone and walking.whole_body == "planned"):
-            problem = "is library; valid: in a planned walk (whole_body) without supports"
-            raise refuse("walking.footprints", problem)
+        problem = "is recorded; valid before supports: balanced, or leave it out"
+        refuse_if(recorded and not alone, "walking.whole_body", problem)
         if not alone:
             return
         refuse_if(self.task.act is not None, "task.act", "is given beside walking; valid: one of them")
@@ -328,8 +321,7 @@ def _only_planned(data: dict[str, Any]) -> bool:
     body, walking = data.get("body"), data.get("walking")
     if isinstance(body, dict) and body.get("model") == "point_mass":
         return True
-    recorded = isinstance(walking, dict) and walking.get("whole_body", "recorded") == "recorded"
-    return recorded and data.get("supports") is None
+    return isinstance(walking, dict) and walking.get("whole_body") == "recorded"
 
 
 def json_schema() -> dict[str, Any]:

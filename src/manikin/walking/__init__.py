@@ -37,15 +37,15 @@ from manikin.walking.segmentation import (
     ShoulderPaths,
     segment_path,
 )
-from manikin.walking.stepper import StepRule, place_footprints, walked_footprints
+from manikin.walking.stepper import SteppedPath, StepRule, step_along
 
 __all__ = [
     "HOLONOMIC", "KINDS", "LITERAL_ORDER", "NONHOLONOMIC", "PROSE_ORDER", "RECORDED_TURNS",
     "RECORDED_WALKS", "STANDING", "START", "CategorySpread", "CategoryStatistics",
     "Footprints", "HolonomicZone", "PathSegments", "SegmentationRule", "ShoulderPaths", "StepRule",
-    "Walk", "WalkController", "WalkFrame", "WalkObjective", "WalkObstacle", "WalkRoute", "Walker",
-    "WalkingPath", "Waypoint", "category_goals", "category_of", "category_statistics",
+    "SteppedPath", "Walk", "WalkController", "WalkFrame", "WalkObjective", "WalkObstacle", "WalkRoute",
+    "Walker", "WalkingPath", "Waypoint", "category_goals", "category_of", "category_statistics",
     "experiment_targets", "floor_plan", "holonomic_ends", "holonomic_zone", "load_library",
-    "path_deviation", "place_footprints", "save_library", "segment_path", "walk_along",
-    "walked_footprints", "walking_path", "walking_route",
+    "path_deviation", "save_library", "segment_path", "step_along", "walk_along",
+    "walking_path", "walking_route",
 ]  # fmt: skip

@@ -13,7 +13,10 @@ from manikin.reports.figures.walks import KINDS, walk_paths_figure
 
 @pytest.fixture(scope="module")
 def caught(runs, tmp_path_factory):
-    return shutil.copytree(runs("catch").directory, tmp_path_factory.mktemp("runs") / "catch")
+    return shutil.copytree(
+        runs("catch", overrides=("walking.whole_body=recorded",)).directory,
+        tmp_path_factory.mktemp("runs") / "catch",
+    )
 
 
 def test_everybody_is_drawn_where_the_run_says(caught):

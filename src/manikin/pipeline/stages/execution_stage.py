@@ -10,7 +10,7 @@ import numpy as np
 from joblib import cpu_count
 
 from manikin.balance.contact_forces import FrictionUse, friction_share
-from manikin.contact import ContactKind, ContactSchedule, FrictionModel
+from manikin.contact import ContactKind, ContactSchedule, FrictionModel, StanceSequence
 from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, StageFailure, place
@@ -116,6 +116,13 @@ class PlannedMotion:
     def end(self) -> float:
         """Time of the last sample [s]."""
         return float(self.motion.time[-1])
+
+    def then(self, after: "PlannedMotion") -> "PlannedMotion":
+        """Two motions, of which the second begins at rest in the last posture of this one, as one."""
+        delay, schedule = self.end - float(after.motion.time[0]), after.schedule
+        instants = np.concatenate([self.schedule.instants, schedule.instants[1:] + delay])
+        phases = StanceSequence([*self.schedule.sequence, *schedule.sequence])
+        return PlannedMotion(ContactSchedule(phases, instants), self.motion.then(after.motion), after.act)
 
 
 FORCE_ERROR = 0.05

@@ -14,7 +14,7 @@ from manikin.planning.contacts.footsteps import HIGHEST
 from manikin.planning.whole_body import FREE_HANDS, RefineResult, RefineScales, RefineSettings, refine_motion
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.swing_planner import with_mid_flights
-from manikin.scenarios.planned import STATURE
+from manikin.scenarios.found_supports import STATURE
 
 
 def refine_contacts(

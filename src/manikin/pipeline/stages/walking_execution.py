@@ -1,5 +1,6 @@
 """Walking stage of walks that are executed: on people's footprints, in balance, in the physics engine."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -7,11 +8,25 @@ import numpy as np
 
 from manikin import walking
 from manikin.motion import Motion
+from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.execution_stage import ExecutionRequirements, PlannedMotion, execute_motion
-from manikin.pipeline.stages.walking_stage import FRICTION, STAGE, keep_paths, path_block, plan_walks
+from manikin.pipeline.stages.walking_stage import (
+    FRICTION,
+    STAGE,
+    PlannedWalks,
+    keep_paths,
+    path_block,
+    place_of,
+    plan_walks,
+    room_requirement,
+    walk_others,
+    ways_found,
+)
 from manikin.runtime.requirement import Requirement, requirement_table
+from manikin.scenarios.world import flat_sequence
 from manikin.simulation import Execution
+from manikin.walking.footprints import FEET, Footprints
 from manikin.walking.gait.balanced_walk import BalancedWalk, balanced_walk
 
 REACHED = 2e-3
@@ -35,45 +50,101 @@ class ExecutedWalk:
 def walk_in_balance(context: RunContext, report: Report, requirements: ExecutionRequirements) -> ExecutedWalk:
     """Find the way of a walking scenario, walk it on people's footprints in balance, and execute that."""
     plan = plan_walks(context)
-    keep_paths(report, plan)
-    report.progress(STAGE, 0.3)
-    if not plan.route.succeeded:
-        report.fail(STAGE, plan.route.failure or "", where="way of the body")
-        report.finish(STAGE, path_block(plan))
+    walk = _walked(context, report, plan)
+    if walk is None:
         return ExecutedWalk()
-    path = plan.route.legs[0]
-    speed = float(np.hypot(*path.velocity[:, :2].T).max())
-    rule = walking.StepRule.of_people(speed).scaled(context.body.stature or 1.75)
+    report.keep_motions(walk.schedule, walk.motion)
+    report.planned = report.failure is None
+    if report.failure is not None or not context.scenario.execution_required:
+        return ExecutedWalk(walk.motion)
+    planned = PlannedMotion(walk.schedule, walk.motion)
+    execution = execute_motion(context, report, planned, walked_requirements(context, requirements))
+    report.judge()
+    return ExecutedWalk(walk.motion, execution)
+
+
+def way_before(context: RunContext) -> tuple[PlannedWalks, dict[str, FloatArray]]:
+    """The way to the first phase of a scenario's supports, and (3,) x, y [m], yaw [rad] of its feet.
+
+    Raises:
+        ScenarioError: If the way cannot be asked for, or the supports do not begin on both feet.
+    """
+    scenario, section = context.scenario, context.scenario.file.walking
+    stance = {contact.effector: contact for contact in flat_sequence(scenario)[0].stance}
+    if missing := [foot for foot in FEET if foot not in stance]:
+        lacks = f"has no {missing[0]}; valid for a walk to it: both feet"
+        raise scenario.error(("supports", "phases", 0), lacks)
+    ends = {foot: np.append(stance[foot].position[:2], stance[foot].yaw) for foot in FEET}
+    places = np.array(list(ends.values()))
+    goal = np.append(places[:, :2].mean(axis=0), np.angle(np.exp(1j * places[:, 2]).sum()))
+    start = None if section is None or section.start is None else place_of(section.start)
+    return plan_walks(context, start, goal), ends
+
+
+def walk_before(context: RunContext, report: Report, planned: PlannedMotion) -> PlannedMotion:
+    """The walk to a motion on supports, and the motion; this alone where the scenario has no walk.
+
+    The walk comes to rest in the first posture of the motion.
+    """
+    if context.scenario.file.walking is None or report.failure is not None:
+        return planned
+    walk = _walked(context, report, *way_before(context), planned.motion.q[0])
+    if walk is None or report.failure is not None:
+        report.planned = False
+        return planned
+    for stage in ("centroidal", "wholebody"):
+        report.require(stage, report.table(stage).later(walk.motion.duration))
+    whole = PlannedMotion(walk.schedule, walk.motion).then(planned)
+    report.keep_motions(whole.schedule, whole.motion)
+    return whole
+
+
+def walked_requirements(context: RunContext, requirements: ExecutionRequirements) -> ExecutionRequirements:
+    """The requirements, with a share of balanced control steps where the scenario has a walk."""
+    walks = context.scenario.file.walking is not None
+    return replace(requirements, margin_share=BALANCED) if walks else requirements
+
+
+def _walked(
+    context: RunContext, report: Report, plan: PlannedWalks, ends: Mapping[str, FloatArray] | None = None,
+    last: FloatArray | None = None,
+) -> BalancedWalk | None:  # fmt: skip
+    """The walk in balance on a planned way, reported; None where there is none.
+
+    Args:
+        ends: (3,) x, y [m], yaw [rad] where each foot stands at the end; beside the goal if omitted.
+        last: (nq,) posture in which it ends; standing if omitted.
+    """
+    if not ways_found(report, plan):
+        return None
+    height, rule = context.scene.floor_height or 0.0, walking.StepRule().scaled(context.body.stature or 1.75)
     with context.scenario.refusing(("walking",)):
-        footprints = walking.place_footprints(path, rule, height=context.scene.floor_height or 0.0)
-        walk = balanced_walk(context.body, footprints, path, friction=FRICTION)
-    report.progress(STAGE, 1.0)
-    report.finish(STAGE, path_block(plan) | {"steps": footprints.count} | _measures(walk))
+        stepped = walking.step_along(plan.route, rule, ends=ends, height=height)
+        walk = balanced_walk(context.body, stepped, friction=FRICTION, end=last)
+    report.progress(STAGE, 0.6)
+    keep_paths(report, plan, stepped)
+    block = path_block(plan, stepped)
+    report.finish(STAGE, block | _measures(walk, stepped.footprints))
     table = requirement_table([
         Requirement("missed_m", "distance of a foot from its place, out of reach", "m", walk.missed, "<=",
                     REACHED),
         Requirement("beyond_range_rad", "angle of a hinge beyond its range", "rad", walk.excess,
                     "<=", BEYOND),
+        None if block["min_room_m"] is None else room_requirement(context, block["min_room_m"]),
     ])  # fmt: skip
     report.require(STAGE, table)
-    report.keep_motions(walk.schedule, walk.motion)
     if (broken := table.first_broken) is not None:
-        report.fail(STAGE, f"{broken.reason}; slower steps are shorter", where="legs")
-        return ExecutedWalk(walk.motion)
-    report.planned = True
-    if not context.scenario.execution_required:
-        return ExecutedWalk(walk.motion)
-    planned = PlannedMotion(walk.schedule, walk.motion)
-    execution = execute_motion(context, report, planned, replace(requirements, margin_share=BALANCED))
-    report.judge()
-    return ExecutedWalk(walk.motion, execution)
+        report.fail(STAGE, broken.reason, where="way of the body" if broken.key == "min_room_m" else "legs")
+    walk_others(context, report, plan)
+    return walk
 
 
-def _measures(walk: BalancedWalk) -> dict[str, Any]:
+def _measures(walk: BalancedWalk, footprints: Footprints) -> dict[str, Any]:
     """Of the planned walk: what may be out of reach of its torques, and how well its parts agree."""
     share = walk.torque_share
     row, joint = (int(k) for k in np.unravel_index(np.argmax(share), share.shape))
     return {
+        "motion_s": footprints.end, "steps": footprints.count,
         "max_torque_share": float(share[row, joint]), "tightest_joint": walk.body.joint_names[joint],
         "max_zmp_error_m": float(walk.zmp_error.max()),
     }  # fmt: skip

@@ -238,20 +238,15 @@ class WalkerSection(Section):
 class WalkingSection(Section):
     """A walk from start to goal of the task: path by optimal control, whole body from recorded walks."""
 
-    whole_body: Literal["recorded", "planned", "balanced"] = preset(
-        "recorded",
-        "recorded: as recorded people walk, along the path; planned: on footprints along the "
-        "path, balanced and executed in the physics engine; balanced: as recorded people walk, in balance "
-        "on footprints as far apart and as frequent as people's, on feet that roll, and executed",
-    )
-    footprints: Literal["stepper", "library"] = preset(
-        "stepper",
-        "of a planned walk from start to goal: stepper, by rules along the path; library, where "
-        "recorded people's feet stand on the same path, and no faster than they go",
+    whole_body: Literal["balanced", "recorded"] = preset(
+        "balanced",
+        "balanced: as recorded people walk, in balance on footprints as far apart and as frequent as "
+        "people's, on feet that roll, executed in the physics engine; recorded: as recorded people walk, "
+        "without dynamics, to be watched",
     )
     start: StandSection | None = optional(
-        "with supports: where the body walks from, to the feet of their first phase; the plan "
-        "goes on from there"
+        "with supports: where the body walks from, to the feet of their first phase, where it comes to "
+        "rest in the first posture of their motion"
     )
     via: list[WaypointSection] = Field(
         default_factory=list, description="where the way to the goal leads past, in order"
@@ -269,10 +264,6 @@ class WalkingSection(Section):
         description="others who walk there; each keeps away from those before it in the list, and the "
         "scenario's body from all of them",
     )  # fmt: skip
-
-    def is_planned(self, supports: object) -> bool:
-        """Whether footprints are planned and executed, as they always are before supports."""
-        return self.whole_body != "recorded" or supports is not None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -31,13 +31,10 @@ from manikin.walking.footprints import FEET, Footprints
 from manikin.walking.gait.blend import Gait
 from manikin.walking.gait.motion_library import MotionLibrary, load_library
 from manikin.walking.gait.rolling_steps import RollingFoot, RollRule, rolling_schedule
-from manikin.walking.path.walking_path import SampledWalk
+from manikin.walking.stepper import LEAD, SteppedPath
 
 STEP = 0.005
 """Time between two samples [s], that of control."""
-
-LEAD = 0.8
-"""Time of standing before and after the footprints, in which the weight shifts [s]."""
 
 SHIFT = 0.7
 """Longest time in which the load goes from one foot to the other [s]."""
@@ -86,16 +83,16 @@ class BalancedWalk:
 
 
 def balanced_walk(
-    body: BodyModel, footprints: Footprints, path: SampledWalk, *, friction: float = 0.8,
+    body: BodyModel, stepped: SteppedPath, *, friction: float = 0.8, end: FloatArray | None = None,
     rule: RollRule | None = None, library: MotionLibrary | None = None,
 ) -> BalancedWalk:  # fmt: skip
     """Walk on footprints along the path that they were placed on, in balance.
 
     Args:
         body: A human.
-        footprints: Where and when the feet stand; their time is that of the path.
-        path: Path of the middle between the feet.
+        stepped: Path of the middle between the feet, and where and when these stand.
         friction: Coulomb coefficient of the soles, for the contacts of the schedule.
+        end: (nq,) posture on both feet with which the walk ends; standing as the library's when omitted.
         rule: How feet roll; as people's when omitted.
         library: Cycles; those that come with this package if omitted.
 
@@ -103,10 +100,10 @@ def balanced_walk(
         InputError: If the footprints have no step.
         BodyError: If the body is no human.
     """
-    if footprints.count == 0:
+    if stepped.footprints.count == 0:
         raise InputError("footprints have no step; valid: at least one")
     friction = finite_number(friction, "friction of the soles", above=0.0)
-    plan = _Plan(body, footprints, path, rule or RollRule(), library or load_library())
+    plan = _Plan(body, stepped, end, rule or RollRule(), library or load_library())
     for _ in range(PASSES):
         plan.improve()
     return plan.result(friction)
@@ -118,14 +115,13 @@ class _Plan:
     def __init__(
         self,
         body: BodyModel,
-        footprints: Footprints,
-        path: SampledWalk,
+        stepped: SteppedPath,
+        last: FloatArray | None,
         rule: RollRule,
         library: MotionLibrary,
     ) -> None:
-        self.body, self.legs = body, LegKinematics(body)
-        begin, end = footprints.start - LEAD, footprints.end + LEAD
-        self.time: FloatArray = begin + STEP * np.arange(round((end - begin) / STEP) + 1, dtype=np.float64)
+        self.body, self.legs, footprints = body, LegKinematics(body), stepped.footprints
+        self.time: FloatArray = STEP * np.arange(round(footprints.end / STEP) + 1, dtype=np.float64)
         self.floor = float(footprints.steps[0].position[2])
         self.feet = [RollingFoot(body, footprints, name, rule) for name in FEET]
         paths = [foot.path(self.time) for foot in self.feet]
@@ -137,8 +133,13 @@ class _Plan:
                      for foot, (_, _, bend) in zip(self.feet, paths, strict=True)]  # fmt: skip
         self.share = load_shares(footprints, self.time)
         self.pressure = np.stack([foot.pressure(self.time) for foot in self.feet])
+        self.settled = least_jerk(np.clip(1.0 - (self.time[-1] - self.time) / LEAD, 0.0, 1.0))[0]
+        self.last = None if last is None else Configuration(body, last)
+        if self.last is not None:
+            middle = np.einsum("k,ki->i", self.share[:, -1], self.pressure[:, -1])
+            self.pressure[..., :2] += self.settled[:, None] * (self.last.com - middle)[:2]
         self.zmp = np.einsum("kn,kni->ni", self.share, self.pressure)
-        self._style(path, Gait(library, body))
+        self._style(stepped, Gait(library, body))
         straight = self.legs.thigh + self.legs.shank - float(self.legs.length_at(np.array(STANDING_KNEE)))
         high = self.floor + float(Configuration(body).com[2]) - straight
         self.height = HeightProfile(footprints, self.time, high)
@@ -151,19 +152,21 @@ class _Plan:
         self.shifted = np.zeros((len(self.time), 3))
         self.moment = np.zeros((len(self.time), 3))
 
-    def _style(self, path: SampledWalk, gait: Gait) -> None:
+    def _style(self, stepped: SteppedPath, gait: Gait) -> None:
         """Pelvis and hinges as in the library's cycle of the velocity, at the phase of the footprints."""
-        within = np.clip(self.time, 0.0, path.duration)
-        velocity = path.motion_at(within)[0].copy()
-        velocity[(self.time <= 0.0) | (self.time >= path.duration)] = 0.0
+        velocity = stepped.motion_at(self.time)[0]
         blend = gait.blend(velocity)
         events = np.einsum("nk,nke->ne", blend.weights, gait.library.events[blend.cycles])
-        frames = gait.frames(blend, gait_phase(self.feet, self.time, events), path.place_at(within))
-        turn: FloatArray = frames.pelvis
-        yaw = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
-        pitch, roll = -np.arcsin(turn[:, 2, 0]), np.arctan2(turn[:, 2, 1], turn[:, 2, 2])
+        frames = gait.frames(blend, gait_phase(self.feet, self.time, events), stepped.place_at(self.time))
+        yaw, pitch, roll = _angles_of(frames.pelvis)
+        yaw = np.unwrap(yaw)
         rows = np.column_stack([yaw, pitch, roll, frames.place, frames.angles])
         smooth = _smoothed(rows, STYLE_CUTOFF)
+        if self.last is not None:
+            pelvis = pin.XYZQUATToSE3(self.last.q[:7])
+            end = np.concatenate([_angles_of(pelvis.rotation), pelvis.translation, self.last.q[7:]])
+            end[0] = yaw[-1] + np.angle(np.exp(1j * (end[0] - yaw[-1])))
+            smooth = smooth + self.settled[:, None] * (end - smooth)
         yaw, pitch, roll = smooth[:, 0], smooth[:, 1], smooth[:, 2]
         self.pelvis, self.turn = rotations(yaw, pitch, roll), quaternions(yaw, pitch, roll)
         self.origin, self.angles = smooth[:, 3:6], smooth[:, 6:]
@@ -171,6 +174,8 @@ class _Plan:
     def improve(self) -> None:
         """One round: centre of mass over the ZMP, the body with it, and what that changes."""
         z = self.height.at(self.time)
+        if self.last is not None:
+            z = z + self.settled * (self.last.com[2] - z[-1])
         self.wanted = np.column_stack([self._from_rest_to_rest(z - self.floor), z])
         for _ in range(PASSES):
             self._pose()
@@ -308,6 +313,8 @@ def load_shares(footprints: Footprints, time: FloatArray) -> FloatArray:
         for step in footprints.steps
         if step.leaves < footprints.end - STEP
     ]  # fmt: skip
+    changes += [(landed, landed + SHIFT, 0.5) for landed, leaves, _ in changes
+                if footprints.start < landed < leaves - 2.0 * SHIFT]  # fmt: skip
     for landed, leaves, then in [*sorted(changes, key=lambda item: item[1]), (last, last + SHIFT, 0.5)]:
         begin = max(landed, leaves - SHIFT) if landed > footprints.start else leaves - SHIFT
         rows = time >= begin
@@ -381,6 +388,12 @@ class HeightProfile:
         most = np.zeros(len(self.instants))
         np.maximum.at(most, nearest, by)
         self.heights = self.heights - most
+
+
+def _angles_of(turn: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Yaw, pitch and roll (...) of rotations (..., 3, 3) [rad]."""
+    yaw = np.arctan2(turn[..., 1, 0], turn[..., 0, 0])
+    return yaw, -np.arcsin(turn[..., 2, 0]), np.arctan2(turn[..., 2, 1], turn[..., 2, 2])
 
 
 def _toes(foot: str) -> str:

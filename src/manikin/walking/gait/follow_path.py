@@ -4,7 +4,7 @@ A walk follows a whole path at once, or directives frame by frame: velocities in
 chapter 6).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from manikin.body import BodyModel
+from manikin.body import BodyModel, Configuration
+from manikin.contact.from_motion import LevelSupport, level_supports
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.dynamics import centroidal_motion
@@ -245,6 +246,14 @@ class Walk:
     def feet(self) -> tuple[str, ...]:
         """Effectors that walk, in the order of ``support``."""
         return tuple(f"{side}_foot" for side in SIDES)
+
+    def supports(self, foot: int) -> Iterator[LevelSupport]:
+        """Supports of one foot, in order."""
+        name = self.feet[foot]
+        return level_supports(
+            self.support[:, foot],
+            lambda row: Configuration(self.body, self.q[row]).effector_placement(name),
+        )
 
     @cached_property
     def motion(self) -> Motion:

@@ -93,6 +93,14 @@ class WalkRoute(SampledWalk):
             times.append(times[-1] + leg.duration + wait)
         return tuple(times)
 
+    @property
+    def stretches(self) -> tuple[tuple[float, float], ...]:
+        """Instants at which it begins to move from rest, and at which it rests again [s]."""
+        rests = [not np.any(leg.task.goal_velocity) for leg in self.legs]
+        ends = [begin + leg.duration for begin, leg in zip(self.begins, self.legs, strict=True)]
+        starts = itertools.compress(self.begins, [True, *rests[:-1]])
+        return tuple(zip(starts, itertools.compress(ends, rests), strict=True))
+
     @cached_property
     def duration(self) -> float:
         """Duration with all waits [s]."""

@@ -96,6 +96,11 @@ class SampledWalk(ABC):
         """(..., 3) velocities and (..., 3) accelerations of the body at (...) instants [s]."""
 
     @property
+    def stretches(self) -> tuple[tuple[float, float], ...]:
+        """Instants at which it begins to move from rest, and at which it rests again [s]."""
+        return ((0.0, self.duration),)
+
+    @property
     def succeeded(self) -> bool:
         """Whether it is a solution of its task."""
         return self.failure is None
