@@ -15,7 +15,8 @@ from manikin.body import human
 from manikin.scenarios import load_scenario
 from manikin.scene import Scene
 from manikin.simulation import Execution, execute
-from manikin.walking import Footprints, StepRule, place_footprints
+from manikin.walking import SteppedPath, step_along
+from manikin.walking.footprints import Footprint
 from manikin.walking.gait.balanced_walk import balanced_walk
 from manikin.walking.path.steady_walk import SteadyWalk
 
@@ -65,18 +66,25 @@ class Walked:
     """An executed walk."""
 
     velocity: tuple[float, float, float]
-    footprints: Footprints
     path: SteadyWalk
+    stepped: SteppedPath
     execution: Execution
+
+    def landed(self) -> list[Footprint]:
+        """Footprints on which feet land at full speed, in order."""
+        full = np.array([self.path.ramp - 0.1, self.path.ramp + self.path.hold + 0.1])
+        begin, end = np.interp(full, self.stepped.clock[:, 1], self.stepped.clock[:, 0])
+        steps = sorted(self.stepped.footprints.steps, key=lambda step: step.lands)
+        return [step for step in steps if begin <= step.lands <= end]
 
 
 def walked(velocity: tuple[float, float, float], scene: Scene) -> Walked:
     """Walk with a velocity from rest to rest."""
     body, fastest = human(), float(np.abs(velocity).max())
     path = SteadyWalk(np.array(velocity), HOLD, max(0.8, fastest / RAMP))
-    footprints = place_footprints(path, StepRule.of_people(float(np.hypot(*velocity[:2]))))
-    walk = balanced_walk(body, footprints, path)
-    return Walked(velocity, footprints, path, execute(body, scene, walk.motion, walk.schedule, hold=0.3))
+    stepped = step_along(path)
+    walk = balanced_walk(body, stepped)
+    return Walked(velocity, path, stepped, execute(body, scene, walk.motion, walk.schedule, hold=0.3))
 
 
 def outcome(name: str, walk: Walked) -> str:
@@ -93,15 +101,13 @@ def steps(name: str, walk: Walked) -> str | None:
     speed, motion = walk.velocity[0], walk.execution.motion
     if speed <= 0.0 or walk.velocity[1] or walk.execution.failure:
         return None
-    full = (walk.path.ramp - 0.1, walk.path.ramp + walk.path.hold + 0.1)
-    landed = [step for step in sorted(walk.footprints.steps, key=lambda step: step.lands)
-              if full[0] <= step.lands <= full[1]]  # fmt: skip
+    landed = walk.landed()
     times = np.array([step.lands for step in landed])
     ways = [np.hypot(*(b.position - a.position)[:2]) for a, b in pairwise(landed)]
     force = motion.contact_force[..., 2] / (human().mass * 9.81)
     cycle = (motion.time >= times[0]) & (motion.time < times[-1])
     both = float(np.mean((force[cycle] > LOADED).all(axis=1)))
-    peaks = np.array([loads(force, motion.time, walk, k) for k in range(len(landed) - 1)])
+    peaks = np.array([loads(force, motion.time, step) for step in landed[:-1]])
     first, trough, second = np.median(peaks, axis=0) if len(peaks) else np.full(3, np.nan)
     cadence = 60.0 / float(np.mean(np.diff(times)))
     lengths = f"{np.mean(ways):.2f} | {0.559 * speed**0.523:.2f}"
@@ -109,10 +115,8 @@ def steps(name: str, walk: Walked) -> str | None:
     return f"| {name} | {lengths} | {rates} | {100.0 * both:.0f} % | {forces} |"
 
 
-def loads(force: np.ndarray, time: np.ndarray, walk: Walked, number: int) -> list[float]:
+def loads(force: np.ndarray, time: np.ndarray, step: Footprint) -> list[float]:
     """Means of 40 ms: largest force early in a support, least in its middle, largest late [body weights]."""
-    begin = walk.path.ramp - 0.1
-    step = [s for s in sorted(walk.footprints.steps, key=lambda s: s.lands) if s.lands >= begin][number]
     column = 0 if step.effector == "left_foot" else 1
     smooth = np.convolve(force[:, column], np.full(8, 1.0 / 8.0), mode="same")
     share = (time - step.lands) / (step.leaves - step.lands)

@@ -45,7 +45,7 @@ def test_the_walk_to_the_platform_ends_in_the_first_posture_of_its_plan(runs):
     [
         ("platform", "walking={}", "walking.start"),
         ("stroll", "walking.start={at: [0, 0]}", "walking.start"),
-        ("walk-and-platform", "walking.whole_body=recorded", "walking.whole_body is recorded; valid before"),
+        ("walk-and-platform", "walking.whole_body=recorded", "none for a recorded walk"),
         ("stroll", "contacts={}", "contacts"),
         ("walk-and-platform", "walking.start.at=[0.0, 0.0]", "already is"),
         ("walk-and-platform", "supports.phases.0.left_foot=null", "left_foot"),

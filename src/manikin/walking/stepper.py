@@ -34,6 +34,7 @@ class StepRule:
 
     Attributes:
         walk_ratio: Step length over step frequency [m s].
+        back_ratio: Share of it of steps backwards, which are shorter and more frequent [-].
         longest_step: Steps are shorter than this at any speed [m].
         side_step: Way of the body in a close-and-open pair of steps to the side [m].
         turn_step: Turn of the body in a step [rad].
@@ -54,6 +55,7 @@ class StepRule:
     """
 
     walk_ratio: float = 0.32
+    back_ratio: float = 0.65
     longest_step: float = 0.9
     side_step: float = 0.25
     turn_step: float = np.radians(25.0)
@@ -68,14 +70,14 @@ class StepRule:
     toes_out: float = np.radians(40.0)
     single: float = 0.36
     double: float = 0.1
-    double_share: float = 0.3
-    double_fall: float = 0.06
+    double_share: float = 0.4
+    double_fall: float = 0.12
     double_least: float = 0.2
     standing: float = 0.25
     lengthened: float = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("walk_ratio", "longest_step", "side_step", "turn_step", "narrowest", "sole_length",
+        for name in ("walk_ratio", "back_ratio", "longest_step", "side_step", "turn_step", "narrowest", "sole_length",
                      "longest", "single", "double", "standing"):  # fmt: skip
             finite_number(getattr(self, name), f"step rule {name}", above=0.0)
         for name in ("width", "standing_width", "widest"):
@@ -99,7 +101,8 @@ class StepRule:
     def frequency(self, velocity: FloatArray) -> FloatArray:
         """(...) steps per second at (..., 3) forward, left [m/s] and angular velocities [rad/s]."""
         speed = np.abs(velocity[..., 0])
-        ahead = np.maximum(speed / self.walk_ratio, (speed / self.longest_step) ** 2)
+        ratio = np.where(velocity[..., 0] < 0.0, self.back_ratio, 1.0) * self.walk_ratio
+        ahead = np.maximum(speed / ratio, (speed / self.longest_step) ** 2)
         aside, turning = 2.0 * velocity[..., 1] / self.side_step, velocity[..., 2] / self.turn_step
         return np.sqrt(ahead + aside**2 + turning**2)
 
