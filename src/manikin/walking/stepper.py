@@ -77,8 +77,8 @@ class StepRule:
     lengthened: float = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("walk_ratio", "back_ratio", "longest_step", "side_step", "turn_step", "narrowest", "sole_length",
-                     "longest", "single", "double", "standing"):  # fmt: skip
+        for name in ("walk_ratio", "back_ratio", "longest_step", "side_step", "turn_step", "narrowest",
+                     "sole_length", "longest", "single", "double", "standing"):  # fmt: skip
             finite_number(getattr(self, name), f"step rule {name}", above=0.0)
         for name in ("width", "standing_width", "widest"):
             finite_number(getattr(self, name), f"step rule {name} [m]", at_least=self.narrowest)
