@@ -286,7 +286,7 @@ def hiding(
 
 def picture(
     solids: Sequence[DrawnSolid], camera: Camera, window: Window, pixels: float, *,
-    clear: Collection[str] = (), floor: float | None = None, shadows: bool = True, finer: int = FINER,
+    clear: Collection[str] = (), floor: float | None = None, shadows: bool = True, finer: int | None = None,
 ) -> np.ndarray:  # fmt: skip
     """(h, w, 3) picture, 8 bits a colour, of solids on white.
 
@@ -298,8 +298,9 @@ def picture(
         clear: Names of solids that are seen through, and cast no shadow.
         floor: Height of the floor [m]; None for none.
         shadows: Whether the lamp casts shadows.
-        finer: Computed points of a pixel along each side.
+        finer: Computed points of a pixel along each side; :data:`FINER` if it is left out.
     """
+    finer = FINER if finer is None else finer
     scale = finer * pixels
     opaque = [solid for solid in solids if solid.name not in clear]
     casting = _Triangles.of(opaque) if shadows else _Triangles.of([])

@@ -22,6 +22,8 @@ AZIMUTH, ELEVATION = np.deg2rad(-62.0), np.deg2rad(16.0)
 """Direction of the eye where no body says which is better [rad]."""
 AROUND = 1.0
 """Farther than this from the motion obstacles are cut off [m]."""
+PICTURE = 900
+"""Pixels along the longer side of a picture."""
 _DIRECTIONS = 16
 _POINTS, _EVERY = 90, 12
 _NAMED = 12
@@ -122,13 +124,13 @@ class Space:
         left, right, bottom, top = self.window
         return (top - bottom) / (right - left)
 
-    def draw(self, axes: Axes, points: float = 900.0) -> None:
-        """Draw the picture, so many pixels along its longer side, on axes to scale without ticks."""
+    def draw(self, axes: Axes, points: float | None = None) -> None:
+        """Draw the picture on axes to scale without ticks, :data:`PICTURE` pixels wide or high if None."""
         left, right, bottom, top = self.window
         clear = hiding(self.bodies, self.obstacles, self.camera, self.window)
         image = picture(
             [*self.bodies, *self.obstacles, *contact_solids(self.contacts)], self.camera, self.window,
-            points / max(right - left, top - bottom), clear=clear,
+            (points or PICTURE) / max(right - left, top - bottom), clear=clear,
             floor=None if self.scene is None else self.scene.floor_height,
         )  # fmt: skip
         axes.imshow(image, extent=self.window, interpolation="antialiased", zorder=0)
