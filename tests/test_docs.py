@@ -115,11 +115,12 @@ def test_the_motion_file_is_read_in_ten_lines_without_manikin():
 
 
 @pytest.mark.slow
-def test_scenario_examples_succeed(tmp_path, runs):
-    """The first one is the step whose run the tests share."""
+@pytest.mark.parametrize("quick", [True, pytest.param(False, marks=pytest.mark.long)])
+def test_scenario_examples_succeed(tmp_path, runs, quick):
+    """The first one is the step whose run the tests share, which has less time than the page gives it."""
     first, *others = yaml_examples("scenario")
     assert runs.step_file().read_text() == first
-    results = [runs.step(quick=False)]
+    results = [runs.step(quick=quick)]
     for text in others:
         (tmp_path / "example.yaml").write_text(text)
         results.append(manikin.run(tmp_path / "example.yaml"))

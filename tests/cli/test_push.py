@@ -158,7 +158,13 @@ def test_a_body_that_may_step_holds_more_than_its_bound_and_stiff_ankles_raise_t
     assert found["stiff"]["bound_Ns"] > 1.2 * found["step"]["bound_Ns"]
 
 
-@pytest.mark.parametrize("options", [[], ["--delay", "100"]], ids=["too hard", "never reacts"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param([], id="too hard"),
+        pytest.param(["--delay", "100"], id="never reacts", marks=pytest.mark.long),
+    ],
+)
 def test_a_body_that_falls_is_status_3_with_a_reason(capfd, options):
     force = "100" if options else "500"
     assert (

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,10 @@ from manikin.walking.words import WordGrid, partition
 TWO = ["words", "--slices", "340,150", "--jobs", "1"]
 
 
+once = cache(partition.solve_slice)
+"""Slices are the same in every test, and solved by the first that asks."""
+
+
 @pytest.fixture(autouse=True)
 def small_grid(monkeypatch):
     monkeypatch.setattr(words, "THESIS_GRID", WordGrid((-0.8, 0.4), (3.0, 3.4), 0.4))
@@ -24,11 +29,11 @@ def small_grid(monkeypatch):
 @pytest.fixture
 def solved(monkeypatch):
     """Headings of the slices that are solved in this process."""
-    asked, solve = [], partition.solve_slice
+    asked = []
 
     def counted(heading, grid):
         asked.append(heading)
-        return solve(heading, grid)
+        return once(heading, grid)
 
     monkeypatch.setattr(partition, "solve_slice", counted)
     return asked
@@ -62,19 +67,18 @@ def test_a_rerun_goes_on_and_draws(capsys, solved, tmp_path):
 
 
 def test_an_interrupted_run_keeps_what_it_solved(capsys, tmp_path, monkeypatch):
-    solve = partition.solve_slice
 
     def stopped(heading, grid):
         if heading == 340:
             raise KeyboardInterrupt
-        return solve(heading, grid)
+        return once(heading, grid)
 
     out = ["--out", str(tmp_path / "w"), "--no-figures"]
-    with monkeypatch.context() as patch:
-        patch.setattr(partition, "solve_slice", stopped)
-        assert main([*TWO, *out]) == INTERRUPTED
+    monkeypatch.setattr(partition, "solve_slice", stopped)
+    assert main([*TWO, *out]) == INTERRUPTED
     assert [file.name for file in (tmp_path / "w" / "slices").iterdir()] == ["150.npz"]
     assert not json.loads((tmp_path / "w" / "words.json").read_text())["complete"]
+    monkeypatch.setattr(partition, "solve_slice", once)
     assert main([*TWO, *out]) == DONE
     assert json.loads((tmp_path / "w" / "words.json").read_text())["complete"]
     assert "all" in capsys.readouterr().out

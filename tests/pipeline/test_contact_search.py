@@ -68,8 +68,8 @@ def test_a_scenario_with_planned_supports_can_be_kept_and_run_again(tmp_path):
 
 
 def test_the_same_seed_has_the_same_contacts():
-    one, _, _ = search("crouch", 1)
-    other, _, _ = search.__wrapped__("crouch", 1)
+    one, _, _ = search("crouch")
+    other, _, _ = search.__wrapped__("crouch")
     np.testing.assert_array_equal(one.plan.postures, other.plan.postures)
 
 

@@ -28,7 +28,7 @@ def both(runs):
 
     def made(name):
         if name == "step":
-            return runs.step(quick=False), runs.step(quick=False, moved=MOVE)
+            return runs.step(), runs.step(moved=MOVE)
         return runs.shorter(name), runs.shorter(name, moved=MOVE)
 
     return made

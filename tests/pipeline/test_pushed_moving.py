@@ -1,6 +1,7 @@
 """Pushes during an executed run: from the scenario to the summary, and what is refused."""
 
 import pytest
+from tests.conftest import QUICKLY
 
 from manikin.errors import ScenarioError
 from manikin.pipeline import runner
@@ -48,9 +49,15 @@ def test_a_push_after_the_end_is_refused():
 
 
 @pytest.mark.slow
-def test_a_pushed_body_goes_on_to_its_goal(runs):
+@pytest.mark.parametrize("name", ["step", pytest.param("platform", marks=pytest.mark.long)])
+def test_a_pushed_body_goes_on_to_its_goal(runs, name):
     """The plan is that of the body that nobody pushes, whose run the tests share."""
-    planned, plain, scenario = runs("platform"), load_scenario("platform"), load_scenario("platform@pushed")
+    if name == "step":
+        file = runs.step_file()
+        planned, plain = runs.step(), load_scenario(file, overrides=[QUICKLY])
+        scenario = load_scenario(file, overrides=[QUICKLY, PUSH, "push.force_N=160"])
+    else:
+        planned, plain, scenario = runs(name), load_scenario(name), load_scenario(f"{name}@pushed")
     named = {"name": plain.name, "description": plain.file.description}
     assert scenario.replaced(push=None, **named).to_yaml() == plain.to_yaml()
     report = Report(context := RunContext.of(scenario), None, None, 0.0)

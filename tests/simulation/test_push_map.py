@@ -142,7 +142,10 @@ def test_what_an_early_end_takes_for_held_is_confirmed_by_a_whole_run():
 
 @pytest.mark.parametrize(
     ("direction", "impulse", "recovered"),
-    [pytest.param(0.0, 36.0, False, marks=pytest.mark.long), (180.0, 20.0, True)],
+    [
+        pytest.param(0.0, 36.0, False, marks=pytest.mark.long),
+        pytest.param(180.0, 20.0, True, marks=pytest.mark.long),
+    ],
 )
 def test_a_run_that_ends_at_rest_has_the_verdict_of_a_whole_one(direction, impulse, recovered):
     """Near the border of what is held, where a body rests, leaves its rest to unwind, and rests again."""
