@@ -9,6 +9,7 @@ import pickle
 import re
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each process of the tests would compile all modules again
@@ -17,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer.main
 from hypothesis import HealthCheck, settings
 
 from manikin.body import human
@@ -48,10 +50,11 @@ APART = frozenset({
 
 
 LONG = frozenset({
-    "test_batch.py", "test_contact_model.py", "test_execute.py", "test_key_planes.py",
-    "test_limb_contacts.py", "test_obstacles.py", "test_parts.py", "test_push_map.py", "test_pushed.py",
-    "test_readme.py", "test_recover.py", "test_adaptation.py", "test_timing_free.py", "test_walking.py",
-    "test_walls.py",
+    "test_acts.py", "test_adapt.py", "test_analyze.py", "test_assemble.py", "test_batch.py", "test_cli.py",
+    "test_contact_model.py", "test_execute.py", "test_figures.py", "test_found_supports.py",
+    "test_key_planes.py", "test_limb_contacts.py", "test_obstacles.py", "test_parts.py", "test_push.py",
+    "test_pushed.py", "test_readme.py", "test_recover.py", "test_refine.py", "test_timing_free.py",
+    "test_walk_search.py", "test_walking.py", "test_walls.py", "test_words.py",
 })  # fmt: skip
 """Modules without slow tests that take fifteen seconds and more."""
 
@@ -200,6 +203,14 @@ def coarse_pictures():
         patch.setattr(views, "PICTURE", 160)
         patch.setattr(space, "PICTURE", 300)
         patch.setattr(contacts, "PIXELS", 200)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def commands_built_once():
+    """The tree of commands is built once, as in a process of the command line, not by each test again."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(typer.main, "get_command", cache(typer.main.get_command))
         yield
 
 

@@ -6,6 +6,7 @@ import re
 import sys
 import tomllib
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -23,11 +24,16 @@ DISTRIBUTION = {
 """Names of distributions that differ from those of their packages."""
 
 
+@cache
+def tree_of(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imported(folder):
     """Distributions imported anywhere in a folder, with one file each."""
     found = {}
     for path in sorted((ROOT / folder).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.Import):
                 names = [alias.name for alias in node.names]
             elif isinstance(node, ast.ImportFrom) and node.level == 0:
@@ -63,8 +69,8 @@ def test_benchmarks_and_sweeps_know_the_package_as_it_is(path):
 def test_no_two_classes_have_one_name_and_no_file_name_is_used_more_than_twice():
     """Who reads a name knows what it is; private classes included."""
     files = sorted((ROOT / "src/manikin").rglob("*.py"))
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in files]
-    classes = Counter(node.name for tree in trees for node in tree.body if isinstance(node, ast.ClassDef))
+    nodes = (node for path in files for node in tree_of(path).body)
+    classes = Counter(node.name for node in nodes if isinstance(node, ast.ClassDef))
     assert [name for name, count in classes.items() if count > 1] == []
     names = Counter(path.name for path in files if path.name != "__init__.py")
     assert [name for name, count in names.items() if count > 2] == []

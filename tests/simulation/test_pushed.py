@@ -105,6 +105,7 @@ def test_the_foot_is_lifted_when_the_waiting_is_over(stepping, waiting):
     assert np.all(force[(time > due + 0.1) & (time < due + 0.3)] == 0.0)
 
 
+@pytest.mark.long
 def test_a_plan_that_waits_saves_what_one_that_goes_on_does_not(stepping):
     """The same push is held by the one and not by the other."""
     outcomes = [

@@ -19,6 +19,11 @@ def problem():
 
 
 @pytest.fixture(scope="module")
+def polytopes(problem):
+    return polytopes_of(problem)
+
+
+@pytest.fixture(scope="module")
 def planned(runs):
     """The plan of the run that the tests share."""
     return runs("walls@trial-2").centroidal
@@ -46,9 +51,8 @@ def test_the_scenario_has_the_published_numbers(problem):
     np.testing.assert_allclose(shortest[list(TWO)], 0.3)
 
 
-def test_two_feet_cannot_hold_the_body_still_and_four_can(problem):
+def test_two_feet_cannot_hold_the_body_still_and_four_can(problem, polytopes):
     """Two contacts carry 2 * 500 N of friction, the body weighs 1177 N."""
-    polytopes = polytopes_of(problem)
     for number, polytope in enumerate(polytopes):
         assert can_rest(polytope, problem.mass) == (number not in TWO)
 
@@ -78,9 +82,9 @@ def test_the_margin_is_a_force_that_can_be_applied(planned):
     assert planned.polytopes[phase].distances(wrenches).min() >= -1e-6
 
 
-def test_a_stance_moved_elsewhere_has_the_polytope_it_would_have(problem):
+def test_a_stance_moved_elsewhere_has_the_polytope_it_would_have(problem, polytopes):
     # Three of the nineteen phases: four and two contacts, at the start and on the way.
-    for phase, polytope in [*zip(problem.sequence, polytopes_of(problem), strict=True)][:10:4]:
+    for phase, polytope in [*zip(problem.sequence, polytopes, strict=True)][:10:4]:
         direct = wrench_polytope(phase.stance, reference=problem.reference)
         assert len(direct) == len(polytope)
         # The same set: every row of the one is a row of the other (newtons, rounding of the hull).
