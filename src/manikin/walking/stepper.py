@@ -200,7 +200,7 @@ def step_along(
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
+class _Placed:
     """A step: its number among the cuts, from 1, the foot and (3,) where it is set down."""
 
     number: int
@@ -258,7 +258,7 @@ def _beside(foot: str, place: FloatArray, width: float, splay: float) -> FloatAr
 
 def _steps(
     cuts: _Cuts, rule: StepRule, stands: Mapping[str, FloatArray], ends: Mapping[str, FloatArray]
-) -> Iterator[_Step]:
+) -> Iterator[_Placed]:
     """Steps from where the feet stand, until both are where they end."""
     feet, first = dict(stands), _leading(cuts)
     order = itertools.cycle((first, *(foot for foot in FEET if foot != first)))
@@ -273,7 +273,7 @@ def _steps(
         placed = within_reach(wanted, other, SIDE[foot], rule)
         if np.abs(placed - feet[foot]).max() > _REACHED:
             feet[foot] = placed
-            yield _Step(number, foot, placed)
+            yield _Placed(number, foot, placed)
 
 
 def within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepRule) -> FloatArray:

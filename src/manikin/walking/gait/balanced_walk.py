@@ -319,7 +319,7 @@ def load_shares(footprints: Footprints, time: FloatArray) -> FloatArray:
         begin = max(landed, leaves - SHIFT) if landed > footprints.start else leaves - SHIFT
         rows = time >= begin
         share = np.clip((time[rows] - begin) / (leaves - begin), 0.0, 1.0)
-        left[rows] = now + (then - now) * share**2 * (3.0 - 2.0 * share)
+        left[rows] = now + (then - now) * least_jerk(share)[0]
         now = then
     return np.array([left, 1.0 - left])
 
