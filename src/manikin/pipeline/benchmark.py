@@ -117,13 +117,8 @@ def run_benchmark(
             folder = write_scenes(families, seeds, directory.path / SCENES)
         pairs = product((family.name for family in families), seeds)
         tasks = [BenchmarkTask(name, seed, stage, time_limit, folder) for name, seed in pairs]
-
-        def tell(_task: BenchmarkTask, entry: Mapping[str, Any], done: int, count: int) -> None:
-            if report is not None:
-                report(entry, done, count)
-
         ordered = do_jobs(
-            run_task, tasks, directory, name="benchmark", workers=jobs, fresh=fresh, report=tell
+            run_task, tasks, directory, name="benchmark", workers=jobs, fresh=fresh, report=report
         )
     result = asked | {"complete": True, **counted(ordered), "tasks": ordered}
     result["wall_s"] = clock.perf_counter() - began

@@ -234,7 +234,7 @@ class JobDirectory(ResultDirectory, ABC):
 def do_jobs(
     work: Callable[[J], dict[str, Any]], jobs: Sequence[J], directory: JobDirectory | None, *, name: str,
     workers: int | None = None, cluster: str | None = None, fresh: bool = False,
-    report: Callable[[J, Mapping[str, Any], int, int], None] | None = None,
+    report: Callable[[Mapping[str, Any], int, int], None] | None = None,
 ) -> list[dict[str, Any]]:  # fmt: skip
     """Do jobs side by side, those that are not done yet, and return their entries in the order of the jobs.
 
@@ -245,7 +245,7 @@ def do_jobs(
         workers: Processes; one per usable core when omitted.
         cluster: Address of a Dask scheduler whose workers do the jobs instead.
         fresh: Whether jobs that the directory has already are done again.
-        report: Told each job, its entry, how many are done, and of how many.
+        report: Told each entry, how many are done, and of how many.
 
     Raises:
         ManikinError: If the directory cannot be written to, a process ends before its time, or there is no
@@ -266,5 +266,5 @@ def do_jobs(
             if directory is not None:
                 directory.keep(job, entry)
             if report is not None:
-                report(job, entry, len(entries), len(jobs))
+                report(entry, len(entries), len(jobs))
     return [entries[job.name] for job in jobs]

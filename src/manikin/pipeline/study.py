@@ -166,13 +166,10 @@ def run_study(
         directory.write(STUDY, asked)
         write_job_scenes(todo, directory.path / SCENES)
 
-    def tell(_job: StudyJob, entry: Mapping[str, Any], done: int, count: int) -> None:
-        if report is not None:
-            report(entry, done, count)
-
     entries = do_jobs(
-        run_study_job, todo, directory, name="study", workers=jobs, cluster=cluster, fresh=fresh, report=tell
-    )
+        run_study_job, todo, directory, name="study", workers=jobs, cluster=cluster, fresh=fresh,
+        report=report,
+    )  # fmt: skip
     result = asked | {"complete": True, **judged(study, entries), "jobs": entries}
     result["wall_s"] = clock.perf_counter() - began
     if directory is not None:
