@@ -5,8 +5,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, point, sole, soles_overlap
+from manikin.contact import (
+    CarriedLoad,
+    ContactSchedule,
+    Phase,
+    Stance,
+    StanceSequence,
+    grasp,
+    point,
+    sole,
+    soles_overlap,
+)
 from manikin.errors import ContactError
+from manikin.numerics.spatial import PlanarTransform
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 
@@ -90,3 +101,22 @@ def test_swings_and_their_intervals_follow_from_the_sequence():
     # Half-open phases; the last one is closed.
     assert schedule.phase_at([0.0, 0.499, 0.5, 1.4, 2.0, 9.0]).tolist() == [0, 0, 1, 3, 3, 3]
     assert schedule.support(0.7, ("left_foot", "right_foot")).tolist() == [[False, True]]
+
+
+def test_a_schedule_seen_from_another_frame_keeps_its_contacts_apart_or_one():
+    """A foot that stands on in the next phase stays one contact; points, times and the load follow."""
+    left, right = sole("left_foot", (0.0, 0.1, 0.0), **SIZE), sole("right_foot", (0.4, -0.1, 0.0), **SIZE)
+    load = CarriedLoad({"left_hand": 3.0}, np.array([0.3, 0.0, 0.1]))
+    phases = [Phase(Stance([left])), Phase(Stance([left, right]), load=load)]
+    schedule = ContactSchedule(StanceSequence(phases), [1.0, 1.5, 2.25])
+    transform = PlanarTransform(10.0, -2.0, 90.0)
+    moved = schedule.moved(transform)
+    first, second = moved.sequence
+    assert first.stance["left_foot"] is second.stance["left_foot"]
+    for before, after in zip(phases[1].stance, second.stance, strict=True):
+        np.testing.assert_allclose(
+            after.points_in_world, transform.points(before.points_in_world), atol=1e-12
+        )
+    np.testing.assert_allclose(second.load.offset, [0.0, 0.3, 0.1], atol=1e-15)
+    assert moved.duration == schedule.duration == 1.25
+    assert schedule.moved(PlanarTransform()) is schedule

@@ -5,9 +5,11 @@ import pinocchio as pin
 import pytest
 
 from manikin.numerics.spatial import (
+    area_normals,
     rotation_from_normal,
     rotation_vector,
     rotation_vector_jacobian,
+    unit,
     yaw_about_normal,
 )
 
@@ -29,3 +31,10 @@ def test_a_normal_and_the_yaw_about_it_give_the_rotation_back():
     for normal in [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], *rng.normal(size=(20, 3))]:
         yaw = rng.uniform(-3.1, 3.1)
         assert yaw_about_normal(rotation_from_normal(normal, yaw)) == pytest.approx(yaw, abs=1e-9)
+
+
+def test_unit_vectors_and_normals_of_triangles():
+    """A triangle with legs of 3 and 4 along x and y has the normal 12 z; no length is divided by zero."""
+    corners = np.array([[[1.0, 1.0, 1.0], [4.0, 1.0, 1.0], [1.0, 5.0, 1.0]]])
+    np.testing.assert_array_equal(area_normals(corners), [[0.0, 0.0, 12.0]])
+    np.testing.assert_allclose(unit(np.array([[3.0, 4.0], [0.0, 0.0]])), [[0.6, 0.8], [0.0, 0.0]])
