@@ -57,11 +57,9 @@ def run(
     body = {"stature_m": stature, "mass_kg": mass, "sex": sex, "age": age, "strength": strength}
     if scenario == ALL:
         console.refuse(variant is not None, "--variant", "every variant is run")
-        console.refuse(bool(overrides), "--set", "it belongs to one scenario")
-        console.refuse(moved is not None, "--moved", "it belongs to one scenario")
-        console.refuse(trials is not None, "--trials", "it belongs to one scenario")
-        loaded = load_kg is not None or load_hand is not None
-        console.refuse(loaded, "--load-kg", "it belongs to one scenario")
+        loaded = load_hand if load_kg is None else load_kg
+        single = {"--set": overrides or None, "--moved": moved, "--trials": trials, "--load-kg": loaded}
+        console.refuse_given(single, "it belongs to one scenario")
         return _run_all(out, seed, body, context.obj, draw=figures, workers=jobs, json=json)
     console.refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
     console.refuse(load_hand is not None and load_kg is None, "--load-hand", "it needs --load-kg")

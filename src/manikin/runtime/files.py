@@ -183,9 +183,9 @@ def columns_csv(columns: Mapping[str, np.ndarray], digits: int) -> str:
     return text.getvalue()
 
 
-def to_json(value: Any, indent: int | None = 2) -> str:
+def to_json(value: Any) -> str:
     """JSON text of plain values and numpy arrays; NaN and infinity, which JSON lacks, become null."""
-    return json.dumps(_plain(value), indent=indent, allow_nan=False)
+    return json.dumps(_plain(value), indent=2, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:
