@@ -211,6 +211,7 @@ def _refined(
         keys = schedule.instants, np.array([item.q for item in plan.postures.postures])
     refined, execution = refine_contacts(context, report, schedule, *keys), None
     planned = walk_before(context, report, PlannedMotion(refined.schedule, refined.motion))
+    refined = replace(refined, motion=planned.motion, schedule=planned.schedule)
     if report.failure is None and refined.succeeded and context.scenario.execution_required:
         execution = execute_motion(context, report, planned, walked_requirements(context, requirements))
         report.judge()

@@ -44,7 +44,7 @@ BACK_LIFT = 0.03
 
 
 LIVELY = 1.2
-"""Half of the acceleration with which a swing begins, over that of its mean speed in its time; 0 is least jerk.
+"""Half of the acceleration with which a swing begins, over its mean speed and its time; 0 is least jerk.
 A foot that begins suddenly and lands softly asks less of the hips in between."""
 
 
