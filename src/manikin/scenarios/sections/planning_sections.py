@@ -310,7 +310,7 @@ class PlanningSection(Section):
     friction_model: FrictionModelName = preset("outer", FRICTION_MODEL_TEXT)
     max_duration_s: Positive | None = optional("longest duration of the motion [s]")
     time_limit_s: Positive = preset(
-        300.0, "processor time after which nothing else is tried: a run ends with what failed until then [s]"
+        600.0, "processor time after which nothing else is tried: a run ends with what failed until then [s]"
     )
     zero_end_accelerations: Annotated[bool, Field(strict=True)] = preset(
         True, "whether the CoM starts and ends without acceleration, as at rest"
