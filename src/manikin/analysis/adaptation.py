@@ -169,11 +169,6 @@ class Adaptation:
         return self.carried.scene
 
     @property
-    def planned_duration(self) -> float:
-        """Duration of the plan, or of what it was to follow [s]."""
-        return self.schedule.duration
-
-    @property
     def planned(self) -> Motion | None:
         """The planned whole-body motion."""
         return None if self.adapted is None else self.adapted.motion

@@ -46,7 +46,7 @@ class AdaptationLimits:
             return None
         touches = ran.counted_touches
         first = (touches[0].time, f"{touches[0].segment} on {touches[0].other}") if touches else (None, "")
-        missing = result.planned_duration - ran.motion.duration
+        missing = result.schedule.duration - ran.motion.duration
         fallen = ran.failure_time_s if ran.fell else None
         balanced = float(np.mean(ran.motion.margin > 0.0))
         lowest = float(ran.motion.time[np.argmin(ran.motion.margin)])
@@ -80,7 +80,7 @@ def changes_of(result: Adaptation) -> dict[str, Any]:
     return {
         "body": {"recorded": source.body.signature(), "adapted": result.body.signature()},
         "contacts": contacts, "max_moved_m": max((c["moved_m"] for c in contacts), default=0.0),
-        "duration_s": {"recorded": kept.duration, "planned": result.planned_duration},
+        "duration_s": {"recorded": kept.duration, "planned": result.schedule.duration},
         "phase_durations_s": {
             "recorded": source.schedule.durations.tolist(), "planned": result.schedule.durations.tolist(),
         },

@@ -135,7 +135,7 @@ def _reported(recording: str, result: Adaptation, pace: float, report: Report) -
     ran, adapted, table = result.execution, plain["wholebody"], AdaptationLimits().table(result)
     if adapted is not None:
         report.planned = True
-        report.finish("wholebody", adapted | {"duration_s": result.planned_duration})
+        report.finish("wholebody", adapted | {"duration_s": result.schedule.duration})
         report.keep_motions(result.schedule, result.planned, result.executed)
     if ran is not None and table is not None:
         report.require("execution", table)
