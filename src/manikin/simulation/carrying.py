@@ -109,7 +109,7 @@ class EngineStep(NamedTuple):
         qacc: (nv,) acceleration in the engine's convention.
         rotation: (9,) matrix from the root's axes to the world's.
         force: (6,) generalised force of all contacts on the root: in world axes [N], in its own [N.m].
-        others: (6,) wrench of grips, less that of contacts on which the body only leans [N, N.m].
+        others: (6,) wrench of grips [N, N.m].
         grips: Force [N] and its point [m] of every grip, (2, 3) each, by effector.
         geoms: (k, 2) geometries of the engine.
         depths: (k,) penetration [m].

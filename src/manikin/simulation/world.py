@@ -253,6 +253,9 @@ class World:
         force, moment = forces[:, :3], np.einsum("sij,sj->si", turns.reshape(-1, 3, 3), forces[:, 3:])
         # Inner forces cancel in the root.
         np.add.at(wrenches, owner, np.hstack([force, cross(roots, force) + moment]) + others)
+        if any(step.leant.any() for step in steps):
+            number, _, places, pushes = self.scene_forces(steps, leant=True)
+            np.subtract.at(wrenches, owner[number], np.hstack([pushes, cross(places, pushes)]))
         geoms, positions, frames, friction, forces, leant = (
             np.concatenate([getattr(step, key) for step in steps]) for key in _POINTS
         )
@@ -280,19 +283,19 @@ class World:
         return a
 
     def scene_forces(
-        self, steps: Sequence[EngineStep]
+        self, steps: Sequence[EngineStep], *, leant: bool = False
     ) -> tuple[NDArray[np.int64], NDArray[np.object_], FloatArray, FloatArray]:
-        """Contact points of body and scene in some engine steps.
+        """Contact points of body and scene in some engine steps, or only those on which it leans.
 
         Returns:
             (k,) step of each, (k,) its segment, (k, 3) its place [m], (k, 3) the force there [N].
         """
-        geoms, positions, frames, forces = (
+        geoms, positions, frames, leans, forces = (
             np.concatenate([getattr(step, key) for step in steps])
-            for key in ("geoms", "positions", "frames", "forces")
+            for key in ("geoms", "positions", "frames", "leant", "forces")
         )
         own, other, sign = self._sides(geoms)
-        chosen = np.flatnonzero(~self._is_segment[other])
+        chosen = np.flatnonzero(leans if leant else ~self._is_segment[other])
         owner = np.repeat(np.arange(len(steps)), [len(step.geoms) for step in steps])
         forces = sign * np.einsum("ki,kij->kj", forces, frames.reshape(-1, 3, 3))
         return owner[chosen], self._names[own[chosen]], positions[chosen], forces[chosen]
@@ -331,7 +334,6 @@ class World:
             acts = first >= 0
             forces[acts] = data.efc_force[first[acts, None] + _AXES]
         if self._leans:
-            others -= self._leaning_wrench()
             leant = self._leaning[geoms[:, 0], geoms[:, 1]]
         return EngineStep(
             time, qpos[:3], qvel, data.qacc.copy(), data.xmat[self._root].copy(),
@@ -367,17 +369,6 @@ class World:
         for (time, segment, other), force in pressed.items():
             known = self._touches.get((segment, other), Touch(time, segment, other))
             self._touches[segment, other] = replace(known, force=max(known.force, force))
-
-    def _leaning_wrench(self) -> FloatArray:
-        """Wrench of the contacts of the last step in which the body only leans on something."""
-        total, local = np.zeros(6), np.zeros(6)
-        geoms = self._data.contact.geom
-        for number in np.flatnonzero(self._leaning[geoms[:, 0], geoms[:, 1]]):
-            mujoco.mj_contactForce(self._model, self._data, number, local)
-            *_, swapped = self._parties(*(int(geom) for geom in geoms[number]))
-            force = local[:3] @ self._data.contact.frame[number].reshape(3, 3) * (-1.0 if swapped else 1.0)
-            total += np.concatenate((force, cross(self._data.contact.pos[number], force)))
-        return total
 
     def _act(self) -> None:
         self._data.xfrc_applied[:] = 0.0

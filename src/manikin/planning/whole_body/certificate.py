@@ -18,7 +18,7 @@ from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, rotation_vector
 from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body.refine_measures import RefineObstacles
 from manikin.planning.whole_body.sliding_touchdown import Ignored, SlidingTouchdown, sliding_touchdown_errors
@@ -320,44 +320,78 @@ def support_errors(
 
     Of a contact that is still settling, what it is below its surface counts.
     """
-    model, data = body.pinocchio, body.pinocchio.createData()
+    held = {contact for phase in schedule.sequence for contact in phase.stance}
+    frames = {
+        contact: (body.effector_frame(contact.effector), body.segment_frame(_carrier(body, contact)))
+        for contact in held
+    }
+    every = sorted({frame for pair in frames.values() for frame in pair})
+    rotations, places = _placements(body, every, motion.q)
     names = schedule.sequence.effectors
     position, turn = np.zeros((len(motion.time), len(names))), np.zeros((len(motion.time), len(names)))
     phases = schedule.phase_at(motion.time)
-    settling = {name: schedule.settling(motion.time, name) for name in names}
-    for k, q in enumerate(motion.q):
-        pin.forwardKinematics(model, data, q)
-        pin.updateFramePlacements(model, data)
-        for contact in schedule.sequence[int(phases[k])].stance:
-            here, turned = data.oMf[body.effector_frame(contact.effector)], 0.0
-            away = here.translation - contact.position
-            if settling[contact.effector][k]:
-                moved = -float(contact.normal @ away)
-            elif contact.rolls:
-                moved, turned = contact.rolled_away(here.rotation, here.translation)
-            elif contact.part is SolePart.FULL:
-                moved = float(np.linalg.norm(away))
-                if contact.kind is ContactKind.SOLE:
-                    error = pin.log3(contact.rotation_contact_to_world.T @ here.rotation)
-                    turned = float(np.linalg.norm(error))
-            else:
-                moved = _part_error(body, data, contact)
-            own = k, names.index(contact.effector)
-            position[own], turn[own] = moved, turned
+    for number, phase in enumerate(schedule.sequence):
+        rows = np.flatnonzero(phases == number)
+        for contact in phase.stance if len(rows) else ():
+            settling = schedule.settling(motion.time[rows], contact.effector)
+            columns = map(every.index, frames[contact])
+            own, carrier = ((rotations[rows, k], places[rows, k]) for k in columns)
+            moved, turned = _errors(body, contact, own, carrier)
+            below = (contact.position - own[1]) @ contact.normal
+            column = names.index(contact.effector)
+            position[rows, column] = np.where(settling, below, moved)
+            turn[rows, column] = np.where(settling, 0.0, turned)
     return position, turn
 
 
-def _part_error(body: BodyModel, data: pin.Data, contact: Contact) -> float:
-    """Largest distance of a point of a part from where it touches [m]; tilts show in it too."""
-    effector = body.effector(contact.effector)
-    hanging, moved = hanging_segment(body, effector.segment), 0.0
-    for local, wanted in zip(contact.points, contact.points_in_world, strict=True):
-        inside, segment = effector.translation + effector.rotation @ local, effector.segment
-        if contact.part is SolePart.TOES and hanging is not None:
-            segment, inside = hanging.name, inside - hanging.origin
-        actual = data.oMf[body.segment_frame(segment)].act(inside)
-        moved = max(moved, float(np.linalg.norm(actual - wanted)))
-    return moved
+_Poses = tuple[FloatArray, FloatArray]
+"""Rotations (n, 3, 3) and origins (n, 3) of a frame in the world."""
+
+
+def _placements(body: BodyModel, frames: Sequence[int], postures: FloatArray) -> _Poses:
+    """(n, frames, 3, 3) rotations and (n, frames, 3) origins [m] of frames in n postures."""
+    model, data = body.pinocchio, body.pinocchio.createData()
+    rotations = np.empty((len(postures), len(frames), 3, 3))
+    places = np.empty((len(postures), len(frames), 3))
+    for k, q in enumerate(postures):
+        pin.forwardKinematics(model, data, q)
+        for column, frame in enumerate(frames):
+            here = pin.updateFramePlacement(model, data, frame)
+            rotations[k, column], places[k, column] = here.rotation, here.translation
+    return rotations, places
+
+
+def _carrier(body: BodyModel, contact: Contact) -> str:
+    """Segment with which a contact touches: the toes, where a foot stands on them alone."""
+    segment = body.effector(contact.effector).segment
+    hanging = hanging_segment(body, segment) if contact.part is SolePart.TOES else None
+    return segment if hanging is None else hanging.name
+
+
+def _errors(body: BodyModel, contact: Contact, own: _Poses, carrier: _Poses) -> tuple[FloatArray, FloatArray]:
+    """(n,) position [m] and orientation [rad] errors of an effector in contact.
+
+    Of a part of a sole that is the largest distance of a point from where it touches; tilts show in it too.
+
+    Args:
+        own: Poses of the effector.
+        carrier: Poses of the segment that touches.
+    """
+    still = np.zeros(len(own[1]))
+    if contact.rolls:
+        moved, turned = np.array([contact.rolled_away(*pose) for pose in zip(*own, strict=True)]).T
+        return moved, turned
+    if contact.part is SolePart.FULL:
+        moved = np.linalg.norm(own[1] - contact.position, axis=1)
+        if contact.kind is not ContactKind.SOLE:
+            return moved, still
+        return moved, np.linalg.norm(rotation_vector(contact.rotation_contact_to_world.T @ own[0]), axis=1)
+    effector, segment = body.effector(contact.effector), _carrier(body, contact)
+    points = effector.translation + contact.points @ effector.rotation.T
+    if segment != effector.segment:
+        points = points - body.segment(segment).origin
+    actual = carrier[1][:, None] + points @ carrier[0].transpose(0, 2, 1)
+    return np.linalg.norm(actual - contact.points_in_world, axis=2).max(axis=1), still
 
 
 def deepest_penetration(
