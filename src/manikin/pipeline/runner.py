@@ -117,8 +117,9 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         result, schedule = (result, schedule) if report.prefer_earlier() else again
     for _ in range(1, context.scenario.contacts.attempts):
         stage = failed_stage(report.failure, schedule, with_contacts)
-        tries = stage is not None and with_contacts.has_time
-        other = plan_contacts_again(with_contacts, report, stage) if tries else None
+        if stage is None or not with_contacts.has_time:
+            break
+        other = plan_contacts_again(with_contacts, report, stage)
         if other is None:
             break
         with_contacts = other
