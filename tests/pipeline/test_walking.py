@@ -23,7 +23,7 @@ WALKING = (
 """The walk through a narrow door, twice as long as the others, is in the sweep."""
 
 
-RECORDED = "walking.whole_body=recorded"
+RECORDED = ("walking.whole_body=recorded", "execution=none")
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def walked(tmp_path_factory):
 
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(walking_stage, "plan_walks", noted)
-                result = run(name, overrides=[RECORDED], out=tmp_path_factory.mktemp(name))
+                result = run(name, overrides=RECORDED, out=tmp_path_factory.mktemp(name))
                 found[name] = result, *routes
         return found[name]
 
@@ -178,7 +178,7 @@ def test_the_catcher_runs_up_from_behind_and_arrives(ran, planned):
 
 def test_a_walk_is_as_high_as_its_floor():
     low, high = (
-        run("goal-left", overrides=[RECORDED, f"floor_height_m={height}"]).planned for height in (0.0, 0.4)
+        run("goal-left", overrides=[*RECORDED, f"floor_height_m={height}"]).planned for height in (0.0, 0.4)
     )
     assert np.allclose(high.q[:, 2], low.q[:, 2] + 0.4, atol=1e-12)
     assert np.allclose(high.q[:, 7:], low.q[:, 7:], atol=1e-12)

@@ -14,7 +14,7 @@ from manikin.reports.figures.walks import KINDS, walk_paths_figure
 @pytest.fixture(scope="module")
 def caught(runs, tmp_path_factory):
     return shutil.copytree(
-        runs("catch", overrides=("walking.whole_body=recorded",)).directory,
+        runs("catch").directory,
         tmp_path_factory.mktemp("runs") / "catch",
     )
 
