@@ -21,7 +21,7 @@ def test_only_what_has_joints_and_is_planned_to_move_is_executed():
         for variant in (None, *list_variants(name)):
             job = load_scenario(name, variant)
             walking = job.file.walking
-            recorded = walking is not None and not walking.is_planned(job.file.supports)
+            recorded = walking is not None and walking.whole_body == "recorded"
             assert job.execution_required is not (job.is_point_mass or recorded), job.name
 
 
