@@ -1,6 +1,6 @@
 """Walks in balance on people's footprints: as planned, and as executed in the physics engine."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from manikin.contact import SolePart
 from manikin.numerics.spatial import GRAVITY
 from manikin.scenarios import load_scenario
 from manikin.simulation import Execution, execute
-from manikin.walking import Footprints, step_along
+from manikin.walking import Footprints, SteppedPath, step_along
 from manikin.walking.gait.balanced_walk import STEP, BalancedWalk, balanced_walk, carried_com, load_shares
 from manikin.walking.path.steady_walk import SteadyWalk
 
@@ -19,6 +19,7 @@ SPEED = 0.8
 
 @dataclass(frozen=True)
 class Case:
+    stepped: SteppedPath
     footprints: Footprints
     walk: BalancedWalk
 
@@ -27,7 +28,7 @@ class Case:
 def case() -> Case:
     path = SteadyWalk(np.array([SPEED, 0.0, 0.0]), hold=0.4, ramp=0.8)
     stepped = step_along(path)
-    return Case(stepped.footprints, balanced_walk(human(), stepped))
+    return Case(stepped, stepped.footprints, balanced_walk(human(), stepped))
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +87,28 @@ def test_feet_are_reached_and_do_not_slide(case):
             if foot in held and held[foot].part is SolePart.FULL:
                 _, place = Configuration(walk.body, motion.q[row]).effector_placement(foot)
                 np.testing.assert_allclose(place, held[foot].position, atol=1e-6)
+
+
+def test_a_walk_ends_in_the_posture_that_is_asked_for(case):
+    """An arm raised at the end: the centre of mass comes to rest over other places of the same feet."""
+    body, end = case.walk.body, case.walk.motion.q[-1].copy()
+    end[7 + body.joint_index("right_shoulder_flexion")] += 0.5
+    motion = balanced_walk(body, case.stepped, end=end).motion
+    np.testing.assert_allclose(motion.q[-1], end, atol=1e-3)
+    assert np.abs(motion.v[-5:]).max() < 0.02
+
+
+def test_a_motion_follows_another_one(case):
+    """The second one begins with the last sample of the first; contacts of one are off in the other."""
+    first = case.walk.motion
+    both = first.then(replace(first, contact_names=("left_foot", "left_hand")))
+    n = len(first.time)
+    assert both.contact_names == ("left_foot", "right_foot", "left_hand")
+    assert len(both.time) == 2 * n - 1
+    assert both.duration == pytest.approx(2.0 * first.duration)
+    np.testing.assert_array_equal(both.contact_force[n - 1 :, 2], first.contact_force[:, 1])
+    assert not both.support[n - 1 :, 1].any()
+    assert not both.support[: n - 1, 2].any()
 
 
 def test_a_walk_at_0_8_m_s_is_executed(executed):
