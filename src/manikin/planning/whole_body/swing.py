@@ -23,7 +23,7 @@ from manikin.planning.whole_body.swing_curve import (
     block_rows,
     jerk_energy,
 )
-from manikin.planning.whole_body.swing_path import Clearance, Pose
+from manikin.planning.whole_body.swing_path import FlightClearance, Pose
 
 HEIGHTS = (0.06, 0.10, 0.15, 0.22, 0.30, 0.42, 0.56, 0.70)
 """Apex heights above the higher end that are tried [m]."""
@@ -81,7 +81,7 @@ class SwingPlan:
 
 
 def plan_swing(
-    start: Pose, goal: Pose, start_time: float, end_time: float, clearance: Clearance, *,
+    start: Pose, goal: Pose, start_time: float, end_time: float, clearance: FlightClearance, *,
     limits: SwingLimits | None = None, start_normal: ArrayLike = (0.0, 0.0, 1.0),
     end_normal: ArrayLike = (0.0, 0.0, 1.0), pitch: float = 0.0, refine: int = 20,
     heights: Sequence[float] = HEIGHTS, laterals: Sequence[float] = LATERALS,
@@ -131,7 +131,7 @@ def plan_swing(
     return best
 
 
-def check_swing(curve: SwingCurve, clearance: Clearance, limits: SwingLimits) -> SwingPlan:
+def check_swing(curve: SwingCurve, clearance: FlightClearance, limits: SwingLimits) -> SwingPlan:
     """Measure a curve against its limits, densely in time."""
     times = curve.start_time, curve.end_time
     return _Gauge.of(curve.start, curve.end, times, clearance, limits).check(curve)
@@ -145,13 +145,18 @@ class _Gauge:
         at_contact: (2,) clearances at both ends [m].
     """
 
-    clearance: Clearance
+    clearance: FlightClearance
     limits: SwingLimits
     at_contact: FloatArray
 
     @classmethod
     def of(
-        cls, start: Pose, goal: Pose, times: tuple[float, float], clearance: Clearance, limits: SwingLimits
+        cls,
+        start: Pose,
+        goal: Pose,
+        times: tuple[float, float],
+        clearance: FlightClearance,
+        limits: SwingLimits,
     ) -> "_Gauge":
         """The gauge of flights between two poses."""
         position, rotation = (np.array(part) for part in zip(start, goal, strict=True))

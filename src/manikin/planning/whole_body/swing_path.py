@@ -126,7 +126,7 @@ class Nearness(NamedTuple):
     gradient: FloatArray
 
 
-class Clearance(Protocol):
+class FlightClearance(Protocol):
     """Measures one flying effector."""
 
     def __call__(
@@ -137,7 +137,7 @@ class Clearance(Protocol):
 
 
 class EffectorClearance:
-    """The :class:`Clearance` of one flying effector from the scene and the standing limbs.
+    """The :class:`FlightClearance` of one flying effector from the scene and the standing limbs.
 
     Args:
         scene: The obstacles, the floor included.
@@ -191,7 +191,7 @@ class EffectorClearance:
     def __call__(
         self, time: FloatArray, position: FloatArray, rotation: FloatArray, within: ArrayLike = np.inf
     ) -> Nearness:
-        """See :class:`Clearance`."""
+        """See :class:`FlightClearance`."""
         turns, places = self._own(time, position, rotation)
         ends = [
             joint + length * _unit(np.broadcast_to(self._towards(contact, time), position.shape) - joint)

@@ -25,7 +25,7 @@ from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.swing import HEIGHTS, LATERALS, SwingLimits, plan_swing
 from manikin.planning.whole_body.swing_curve import SwingCurve
-from manikin.planning.whole_body.swing_path import Clearance, EffectorClearance, Nearness, Pose
+from manikin.planning.whole_body.swing_path import FlightClearance, EffectorClearance, Nearness, Pose
 from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing
 from manikin.scene import Proximity, Scene
 
@@ -243,7 +243,9 @@ class FlightPlanner:
         # One that is a little nearer or faster than wanted may do: the fit has the last word.
         return smooth if plan.succeeded or plan.clearance >= 0.0 else self.search(swing, smooth)
 
-    def _way(self, swing: Swing, roll: FootRoll | None) -> tuple[tuple[Pose, Pose], Clearance, SwingLimits]:
+    def _way(
+        self, swing: Swing, roll: FootRoll | None
+    ) -> tuple[tuple[Pose, Pose], FlightClearance, SwingLimits]:
         """Poses at both ends of a flight, the clearance of a pose, and limits; of the pivot of a roll."""
         assert swing.start is not None
         assert swing.end is not None
@@ -283,7 +285,7 @@ class FlightPlanner:
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "reach")
 
-    def _rolling_clearance(self, swing: Swing, roll: FootRoll) -> Clearance:
+    def _rolling_clearance(self, swing: Swing, roll: FootRoll) -> FlightClearance:
         """Clearance of the foot from the pose of the point about which it tilts."""
         distance = self._clearance(swing, roll.toe_extension)
 
