@@ -25,7 +25,7 @@ from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.swing import HEIGHTS, LATERALS, SwingLimits, plan_swing
 from manikin.planning.whole_body.swing_curve import SwingCurve
-from manikin.planning.whole_body.swing_path import FlightClearance, EffectorClearance, Nearness, Pose
+from manikin.planning.whole_body.swing_path import EffectorClearance, FlightClearance, Nearness, Pose
 from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing
 from manikin.scene import Proximity, Scene
 

@@ -16,7 +16,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.birrt import Feasible, plan_flight, slow_enough, walk
 from manikin.planning.whole_body.swing import SwingLimits, required_clearance
 from manikin.planning.whole_body.swing_curve import SwingCurve
-from manikin.planning.whole_body.swing_path import FlightClearance, EffectorPath, Pose
+from manikin.planning.whole_body.swing_path import EffectorPath, FlightClearance, Pose
 
 CONTROLS, SHARPENINGS = (12, 14, 17, 20, 24, 29, 35, 42, 50, 64, 80), (0, 1, 3)
 """Numbers of control poses that are tried, from the smoothest curve to the closest, and corrections towards
@@ -155,8 +155,8 @@ class ClearFlight:
     """
 
     def __init__(
-        self, clearance: FlightClearance, ends: tuple[Pose, Pose], times: tuple[float, float], limits: SwingLimits,
-        extra: float = 0.0,
+        self, clearance: FlightClearance, ends: tuple[Pose, Pose], times: tuple[float, float],
+        limits: SwingLimits, extra: float = 0.0,
     ) -> None:  # fmt: skip
         self._clearance, self._ends = clearance, ends
         at_ends = clearance(np.array(times), *(np.array(part) for part in zip(*ends, strict=True)))
