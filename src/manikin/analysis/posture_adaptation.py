@@ -238,9 +238,9 @@ def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
         yield part, first, first + len(more) + 1
 
 
-KNOT_SPACING, FINE = 0.035, 1
-"""Largest distance of the spline's knots [s], and how often those near the key instants are doubled: heels
-that rise there turn at up to 8 rad/s."""
+KNOT_SPACING, FINE = 0.035, (0.0,)
+"""Largest distance of the spline's knots [s], and the start as a place near which, as near all key instants,
+they are doubled: heels that rise there turn at up to 8 rad/s."""
 
 STEP = 1e-3
 """Distance of the finished motion's samples [s]."""

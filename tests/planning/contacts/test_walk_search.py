@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from manikin.balance import StaticRegion, static_torque_share
 from manikin.body import Configuration, human
+from manikin.body.segments import FEET
 from manikin.contact import ContactKind, ContactModel, Stance, point, sole, soles_overlap
 from manikin.kinematics.posture_terms import SINKING
 from manikin.numerics.polytope import signed_distance
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.planning.contacts import (
-    FEET,
     Endpoints,
     Footholds,
     Habit,

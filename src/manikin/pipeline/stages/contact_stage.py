@@ -13,6 +13,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration, Limb, limb_named
 from manikin.body.limbs import is_further
+from manikin.body.segments import FEET
 from manikin.contact import ContactKind
 from manikin.kinematics.limb_samples import sample_limbs
 from manikin.numerics.spatial import FloatArray
@@ -96,7 +97,7 @@ class _FootSearch(_ContactSearch):
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
         if "buttocks" in goal.contacts:
-            self._seat, rising = goal, contacts.leave_seat(self._poser, goal, frozenset(contacts.FEET))
+            self._seat, rising = goal, contacts.leave_seat(self._poser, goal, frozenset(FEET))
             if rising.failure is not None:
                 return self._tally.failed(f"the goal: {rising.failure}", "goal")
             goal = rising.stages[-1]
