@@ -1,6 +1,7 @@
 """The main job, end to end on the real scenario, whose run the tests share."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -184,3 +185,25 @@ def test_an_execution_that_misses_its_requirement_is_a_failure(platform):
     broken = ExecutionRequirements(foot_error=1e-9).table(platform.execution).first_broken
     assert f"error of {platform.execution.worst_effector} is" in broken.reason
     assert broken.time_s == platform.execution.worst_effector_time_s
+
+
+@pytest.mark.slow
+def test_only_a_walk_may_be_out_of_balance_for_some_control_steps(platform):
+    """One step of a hundred out of balance is allowed in a walk, five are not, and none is after it."""
+    motion = platform.execution.motion
+    count, end = len(motion.time), float(motion.time[-1])
+    half = float(motion.time[count // 2])
+
+    def broken(steps, walked):
+        margin = np.array(motion.margin)
+        margin[steps] = -1.0
+        execution = replace(platform.execution, motion=replace(motion, margin=margin))
+        row = ExecutionRequirements().table(execution, walked=walked).first_broken
+        return None if row is None else row.key
+
+    few, more, last = slice(0, count // 100), slice(0, count // 20), slice(count - 1, count)
+    assert broken(few, -np.inf) == "min_margin"
+    assert broken(few, end) is None
+    assert broken(more, end) == "margin_share"
+    assert broken(few, half) is None
+    assert broken(last, half) == "min_margin"

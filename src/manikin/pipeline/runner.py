@@ -25,12 +25,7 @@ from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, e
 from manikin.pipeline.stages.operation_stage import run_operations
 from manikin.pipeline.stages.recovery_stage import recover_from_push
 from manikin.pipeline.stages.refinement_stage import from_rest_to_rest, is_hard, refine_contacts
-from manikin.pipeline.stages.walking_execution import (
-    walk_before,
-    walk_in_balance,
-    walked_requirements,
-    way_before,
-)
+from manikin.pipeline.stages.walking_execution import walk_before, walk_in_balance, way_before
 from manikin.pipeline.stages.walking_stage import walk_to_goal, ways_found
 from manikin.pipeline.stages.whole_body_stage import (
     follow_centre_of_mass,
@@ -171,7 +166,7 @@ def _followed(
     wholebody = replace(wholebody, motion=planned.motion)
     if report.failure is not None or not context.scenario.execution_required:
         return partial(RunResult.of, report, plan.centroidal, wholebody), schedule
-    execution = execute_motion(context, report, planned, walked_requirements(context, requirements))
+    execution = execute_motion(context, report, planned, requirements)
     report.judge()
     return partial(RunResult.of, report, plan.centroidal, wholebody, execution), schedule
 
@@ -214,6 +209,6 @@ def _refined(
     planned = walk_before(context, report, PlannedMotion(refined.schedule, refined.motion))
     refined = replace(refined, motion=planned.motion, schedule=planned.schedule)
     if report.failure is None and refined.succeeded and context.scenario.execution_required:
-        execution = execute_motion(context, report, planned, walked_requirements(context, requirements))
+        execution = execute_motion(context, report, planned, requirements)
         report.judge()
     return partial(RunResult.of, report, centroidal, refined, execution), refined.schedule

@@ -32,7 +32,7 @@ class ExecutionRequirements:
         com_rms_error: Root mean square distance of the CoM from its plan [m].
         foot_error: Largest distance of an effector from its plan [m].
         margin: Least margin, exclusive [N.m].
-        margin_share: Share of the control steps with such a margin, where not all need it: feet that strike
+        walked_margin_share: Share of the control steps of a walk that need such a margin: feet that strike
             the ground and roll carry nothing, or a line, for some milliseconds.
         penetration: Deepest penetration of hard contacts [m]; ``padding_compression`` where the motion
             ends on a seat, whose impact shakes every contact.
@@ -42,25 +42,31 @@ class ExecutionRequirements:
     com_rms_error: float = 0.015
     foot_error: float = 0.02
     margin: float = 0.0
-    margin_share: float | None = None
+    walked_margin_share: float = 0.97
     penetration: float = 0.005
     padding_compression: float = 0.01
 
-    def table(self, execution: Execution, seated: bool = False) -> RequirementTable:
+    def table(self, execution: Execution, seated: bool = False, walked: float = -np.inf) -> RequirementTable:
         """Every requirement with its measured value, of a motion that may end ``seated``.
 
         Where what was measured does not say when, the time is that of the least margin. A body that was
         pushed is out of balance and off its plan for a while; it has to be back on it at the end.
+
+        Args:
+            execution: The motion as executed.
+            seated: Whether it ends on a seat.
+            walked: Time until which it walks [s].
         """
-        rest = self._followed(execution, seated) if execution.push is None else self._returned(execution)
+        pushed = execution.push is not None
+        rest = self._returned(execution) if pushed else self._followed(execution, seated, walked)
         return requirement_table([*_kept_standing(execution), *rest])
 
-    def _followed(self, execution: Execution, seated: bool) -> list[Requirement | None]:
+    def _followed(self, execution: Execution, seated: bool, walked: float) -> list[Requirement | None]:
         """Requirements of a body that nothing disturbs."""
         deepest, motion = self.padding_compression if seated else self.penetration, execution.motion
         thinnest, pressed = float(motion.time[np.argmin(motion.margin)]), execution.max_padding_compression_m
         return [
-            self._balanced(execution, thinnest),
+            *self._balanced(execution.motion, walked),
             Requirement("com_rms_error_m", "RMS error of the centre of mass", "m",
                         execution.com_rms_error_m, "<=", self.com_rms_error, thinnest),
             Requirement("max_foot_error_m", "error", "m", execution.max_foot_error_m, "<=", self.foot_error,
@@ -71,14 +77,17 @@ class ExecutionRequirements:
                         self.padding_compression, thinnest) if pressed > 0.0 else None,
         ]  # fmt: skip
 
-    def _balanced(self, execution: Execution, time: float) -> Requirement:
-        motion, name = execution.motion, "executed margin"
-        if self.margin_share is None:
-            least = execution.min_margin
-            return Requirement("min_margin", name, motion.margin_unit, least, ">", self.margin, time)
-        share = float(np.mean(motion.margin > self.margin))
-        return Requirement("margin_share", f"share of the time with an {name}", "", share, ">=",
-                           self.margin_share, time)  # fmt: skip
+    def _balanced(self, motion: Motion, walked: float) -> list[Requirement | None]:
+        """Of every control step after a walk, and of a share of those of the walk."""
+        walks, name = motion.time <= walked + 1e-9, "executed margin"
+        stepping, after = motion.margin[walks], motion.margin[~walks]
+        return [
+            Requirement("margin_share", f"share of the walk with an {name}", "",
+                        float(np.mean(stepping > self.margin)), ">=", self.walked_margin_share,
+                        float(motion.time[walks][np.argmin(stepping)])) if stepping.size else None,
+            Requirement("min_margin", name, motion.margin_unit, float(after.min()), ">", self.margin,
+                        float(motion.time[~walks][np.argmin(after)])) if after.size else None,
+        ]  # fmt: skip
 
     def _returned(self, execution: Execution) -> list[Requirement | None]:
         """Requirements of a body that was pushed: it has to come back to its plan."""
@@ -106,11 +115,16 @@ def _kept_standing(execution: Execution) -> list[Requirement]:
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """Motion that is to be executed: contacts in time, all joints, and the act at the end of both."""
+    """Motion that is to be executed: contacts in time, all joints, and the act at the end of both.
+
+    Attributes:
+        walked: Time until which it walks on rolling feet [s]; before all times where it does not.
+    """
 
     schedule: ContactSchedule
     motion: Motion
     act: PlannedAct | None = None
+    walked: float = -np.inf
 
     @property
     def end(self) -> float:
@@ -122,7 +136,8 @@ class PlannedMotion:
         delay, schedule = self.end - float(after.motion.time[0]), after.schedule
         instants = np.concatenate([self.schedule.instants, schedule.instants[1:] + delay])
         phases = StanceSequence([*self.schedule.sequence, *schedule.sequence])
-        return PlannedMotion(ContactSchedule(phases, instants), self.motion.then(after.motion), after.act)
+        joined = ContactSchedule(phases, instants), self.motion.then(after.motion)
+        return PlannedMotion(*joined, after.act, self.walked)
 
 
 FORCE_ERROR = 0.05
@@ -163,7 +178,7 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
         return planned
     acting = push_pull.plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
     report.keep_motions(acting.schedule, acting.motion)
-    return PlannedMotion(acting.schedule, acting.motion, acting)
+    return replace(planned, schedule=acting.schedule, motion=acting.motion, act=acting)
 
 
 def measured_act_failure(
@@ -229,7 +244,7 @@ def execute_motion(
         pushes=pushes, padded=context.padded, settings=settings, wishes=wishes,
         progress=lambda share: report.progress("execution", share),
     )  # fmt: skip
-    table = requirements.table(result, scenario.seated_from is not None)
+    table = requirements.table(result, scenario.seated_from is not None, planned.walked)
     report.require("execution", table)
     fallen = _failure(planned.schedule, result, table)
     exerted = measured_act_failure(context, report, planned, result.motion)

@@ -1,7 +1,7 @@
 """Walking stage of walks that are executed: on people's footprints, in balance, in the physics engine."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -35,9 +35,6 @@ REACHED = 2e-3
 BEYOND = float(np.radians(1.0))
 """Most that a hinge of the plan may be beyond its range, where it is cut off [rad]."""
 
-BALANCED = 0.97
-"""Least share of the control steps with a positive margin: in the others a foot just strikes or leaves."""
-
 
 @dataclass(frozen=True, eq=False)
 class ExecutedWalk:
@@ -57,8 +54,8 @@ def walk_in_balance(context: RunContext, report: Report, requirements: Execution
     report.planned = report.failure is None
     if report.failure is not None or not context.scenario.execution_required:
         return ExecutedWalk(walk.motion)
-    planned = PlannedMotion(walk.schedule, walk.motion)
-    execution = execute_motion(context, report, planned, walked_requirements(context, requirements))
+    planned = PlannedMotion(walk.schedule, walk.motion, walked=float(walk.motion.time[-1]))
+    execution = execute_motion(context, report, planned, requirements)
     report.judge()
     return ExecutedWalk(walk.motion, execution)
 
@@ -94,15 +91,9 @@ def walk_before(context: RunContext, report: Report, planned: PlannedMotion) -> 
         return planned
     for stage in ("centroidal", "wholebody"):
         report.require(stage, report.table(stage).later(walk.motion.duration))
-    whole = PlannedMotion(walk.schedule, walk.motion).then(planned)
+    whole = PlannedMotion(walk.schedule, walk.motion, walked=float(walk.motion.time[-1])).then(planned)
     report.keep_motions(whole.schedule, whole.motion)
     return whole
-
-
-def walked_requirements(context: RunContext, requirements: ExecutionRequirements) -> ExecutionRequirements:
-    """The requirements, with a share of balanced control steps where the scenario has a walk."""
-    walks = context.scenario.file.walking is not None
-    return replace(requirements, margin_share=BALANCED) if walks else requirements
 
 
 def _walked(
