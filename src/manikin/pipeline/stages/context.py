@@ -370,8 +370,12 @@ class Report:
         self._write(file, lambda directory: directory.write(file, result))
 
     def judge_ergonomics(self, motion: Motion | None) -> None:
-        """Take the scores and loads of a person's last motion into the summary, in short."""
-        if motion is not None and not self._context.scenario.is_point_mass:
+        """Take the scores and loads of a person's last motion into the summary, in short.
+
+        Not of one operation of several: the whole motion is judged.
+        """
+        judged = not self._context.scenario.is_point_mass and self._context.handling is FREE_HANDS
+        if motion is not None and judged:
             self.summary["ergonomics"] = ergonomics_in_short(self._context.body, motion, self._schedule)
 
     def keep_scenario(self, scenario: Scenario) -> None:
