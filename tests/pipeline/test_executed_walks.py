@@ -40,6 +40,19 @@ def test_the_walk_to_the_platform_ends_in_the_first_posture_of_its_plan(runs):
     assert np.abs(moved[seam - 3 : seam + 3]).max() < 1e-4
 
 
+def test_a_walk_that_would_meet_a_wall_says_what_and_when():
+    """Between walls 0.52 m apart shoulders fit, arms do not; nothing is executed."""
+    wall = "{{name: {}, box: [1, 0.1, 2], position: [1, {}, 1]}}"
+    walls = f"[{wall.format('left', 0.31)}, {wall.format('right', -0.31)}]"
+    changed = [f"scene={walls}", "walking.room_m=0.0", "task.goal={at: [2, 0], heading_deg: 0}"]
+    result = run("stroll", overrides=changed)
+    failure = result.summary["failure"]
+    assert failure["stage"] == "walk"
+    assert "arm from" in failure["where"] or "hand from" in failure["where"]
+    assert 0.0 < failure["time_s"] < result.summary["walk"]["motion_s"]
+    assert result.executed is None
+
+
 @pytest.mark.parametrize(
     ("name", "override", "words"),
     [

@@ -9,6 +9,8 @@ from manikin.body import Configuration, human
 from manikin.contact import SolePart
 from manikin.numerics.spatial import GRAVITY
 from manikin.scenarios import load_scenario
+from manikin.scene import Box, Obstacle, Scene
+from manikin.scene.distance import Proximity
 from manikin.simulation import Execution, execute
 from manikin.walking import Footprints, SteppedPath, step_along
 from manikin.walking.gait.balanced_walk import STEP, BalancedWalk, balanced_walk, carried_com, load_shares
@@ -96,6 +98,19 @@ def test_a_walk_ends_in_the_posture_that_is_asked_for(case):
     motion = balanced_walk(body, case.stepped, end=end).motion
     np.testing.assert_allclose(motion.q[-1], end, atol=1e-3)
     assert np.abs(motion.v[-5:]).max() < 0.02
+
+
+def test_an_arm_is_drawn_in_beside_a_wall(case):
+    """The swinging left hand would meet it; drawn in it does not, and the other arm swings as before."""
+    wall = Obstacle("wall", Box((2.0, 0.1, 2.0)), translation=(0.5, 0.38, 1.0))
+    scene, body = Scene([wall]), case.walk.body
+    drawn = balanced_walk(body, case.stepped, scene=scene)
+    proximity = Proximity(body, Scene([wall], None), self_collision=False)
+    assert proximity.minimum_over(case.walk.motion.q).distance < 0.0
+    assert proximity.minimum_over(drawn.motion.q).distance > 0.02
+    assert drawn.missed < 1e-6
+    elbow = 7 + body.joint_index("right_elbow_flexion")
+    np.testing.assert_allclose(drawn.motion.q[:, elbow], case.walk.motion.q[:, elbow], atol=1e-9)
 
 
 def test_a_motion_follows_another_one(case):

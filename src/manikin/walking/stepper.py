@@ -11,7 +11,9 @@ from scipy.interpolate import PchipInterpolator
 
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.walking.foot_room import FOOT_ROOM, FootRoom
 from manikin.walking.footprints import FEET, Footprint, Footprints
+from manikin.walking.path.walk_obstacles import WalkObstacle
 from manikin.walking.path.walking_path import SAMPLING, SampledWalk
 
 SIDE = {"left_foot": 1.0, "right_foot": -1.0}
@@ -21,6 +23,20 @@ LEAD = 0.8
 """Time of standing before and after a walk, in which the weight shifts [s]."""
 
 _REACHED = 1e-6
+
+_ROUNDS, _CLOSER = 6, 1.5
+"""Rounds of shorter steps where a foot has no room, and the factor of their frequency in each."""
+
+_AROUND = 0.3
+"""Steps become shorter gradually within this time on the path, before and after those without room [s]."""
+
+_SHORTER = (0.0, 0.2, 0.4)
+_ASIDE = (0.0, 0.02, -0.02, 0.04, -0.04, 0.07, -0.07, 0.1, -0.1)
+_TURNED = tuple(np.radians((0.0, 10.0, -10.0, 20.0, -20.0)))
+_TRIED = np.array(list(itertools.product(_SHORTER, _ASIDE, _TURNED)))
+"""(k, 3) places that are tried for a foot without room: steps back along the way, to the left [m], turned
+[rad]; the nearest one is taken."""
+_EFFORT = np.abs(_TRIED / [1.0, 0.25, 1.0]).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -42,6 +58,7 @@ class StepRule:
             at the start and the end.
         narrowest: Least distance of a landing foot from a parallel one, across their mean heading [m]; feet
             do not cross. Turned feet keep what their soles, of ``sole_length`` [m], need beyond that.
+        sole_width: Of the soles, beside obstacles [m].
         widest: Largest such distance [m]; ``longest`` is that along their mean heading.
         splay: How far each foot is turned outwards from the heading [rad].
         toes_in: A landing foot is turned inwards from the other one by at most this [rad], outwards by
@@ -63,6 +80,7 @@ class StepRule:
     standing_width: float = 0.18
     narrowest: float = 0.13
     sole_length: float = 0.28
+    sole_width: float = 0.12
     widest: float = 0.5
     longest: float = 1.1
     splay: float = np.radians(4.0)
@@ -78,7 +96,7 @@ class StepRule:
 
     def __post_init__(self) -> None:
         for name in ("walk_ratio", "back_ratio", "longest_step", "side_step", "turn_step", "narrowest",
-                     "sole_length", "longest", "single", "double", "standing"):  # fmt: skip
+                     "sole_length", "sole_width", "longest", "single", "double", "standing"):  # fmt: skip
             finite_number(getattr(self, name), f"step rule {name}", above=0.0)
         for name in ("width", "standing_width", "widest"):
             finite_number(getattr(self, name), f"step rule {name} [m]", at_least=self.narrowest)
@@ -93,7 +111,7 @@ class StepRule:
         length = finite_number(stature, "stature [m]", above=0.0) / 1.75
         time = np.sqrt(length)
         factors = dict.fromkeys(("longest_step", "side_step", "width", "standing_width", "narrowest",
-                                 "sole_length", "widest", "longest"), length)  # fmt: skip
+                                 "sole_length", "sole_width", "widest", "longest"), length)  # fmt: skip
         factors |= dict.fromkeys(("single", "double", "standing"), time)
         scaled = {name: getattr(self, name) * factor for name, factor in factors.items()}
         return replace(self, walk_ratio=self.walk_ratio * length * time, **scaled)
@@ -155,7 +173,7 @@ class SteppedPath(SampledWalk):
 
 def step_along(
     path: SampledWalk, rule: StepRule | None = None, *, ends: Mapping[str, FloatArray] | None = None,
-    height: float = 0.0,
+    height: float = 0.0, obstacles: Sequence[WalkObstacle] = (),
 ) -> SteppedPath:  # fmt: skip
     """Alternate steps along a path, from both feet side by side to both feet side by side.
 
@@ -164,11 +182,17 @@ def step_along(
     than side by side, so that legs do not cross: feet close and open. Further steps follow until both feet
     stand. They land half a step before the body passes; a body that is faster than its feet waits for them.
 
+    Where a sole, or what it sweeps on its way, has less than :data:`~manikin.walking.foot_room.FOOT_ROOM` to
+    an obstacle, it is set down a little elsewhere: shorter, to the side, or turned. Where that is not enough,
+    steps become shorter there, so that feet keep nearer to the way of the body. Where it never is, the place
+    with the most room is kept: what a whole body meets is measured elsewhere.
+
     Args:
         path: Path of the middle between the feet.
         rule: Where and when feet are set down.
         ends: (3,) x, y [m], yaw [rad] where each foot stands at the end; beside the goal if omitted.
         height: Height of the floor [m].
+        obstacles: What stands on the floor.
 
     Raises:
         InputError: If the path is no solution, or the rule's limits keep the feet from the goal.
@@ -176,6 +200,7 @@ def step_along(
     rule = rule or StepRule()
     if not path.succeeded:
         raise InputError(f"walking path {path.failure}; valid: a path that succeeded")
+    room = FootRoom(obstacles, rule.sole_length, rule.sole_width)
     stretches = [_Cuts(path, rule, *ends) for ends in path.stretches]
     feet = {foot: _beside(foot, stretches[0].place(0.0), rule.standing_width, rule.splay) for foot in FEET}
     held = {foot: [(0.0, place)] for foot, place in feet.items()}
@@ -183,7 +208,7 @@ def step_along(
     now, clock = LEAD, list[tuple[float, float]]()
     for number, cuts in enumerate(stretches):
         last = number == len(stretches) - 1
-        steps = list(_steps(cuts, rule, feet, ends if last and ends else cuts.ends()))
+        cuts, steps = _roomy_steps(cuts, room, feet, ends if last else None)
         times = _Times(cuts, rule, now, [item.number for item in steps])
         for step, lift, land in zip(steps, times.lifts, times.lands, strict=True):
             leaves[step.foot].append(lift)
@@ -201,20 +226,29 @@ def step_along(
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """A step: its number among the cuts, from 1, the foot and (3,) where it is set down."""
+    """A step: its number among the cuts, from 1, the foot, (3,) where it is set down, what room it lacks."""
 
     number: int
     foot: str
     place: FloatArray
+    lack: float
 
 
 class _Cuts:
     """A stretch of a path from rest to rest over the number of steps done."""
 
-    def __init__(self, path: SampledWalk, rule: StepRule, begin: float, end: float) -> None:
-        self.path, self.rule, self.begin, self.end = path, rule, begin, end
+    def __init__(
+        self, path: SampledWalk, rule: StepRule, begin: float, end: float,
+        closer: Sequence[tuple[float, float]] = (),
+    ) -> None:  # fmt: skip
+        """Count the steps; between each pair of instants in ``closer`` [s] they are shorter."""
+        self.path, self.rule, self.begin, self.end, self.closer = path, rule, begin, end, tuple(closer)
         self._time = np.linspace(begin, end, int(np.ceil((end - begin) / SAMPLING)) + 1)
-        done = cumulative_trapezoid(rule.frequency(path.motion_at(self._time)[0]), self._time, initial=0.0)
+        frequency = rule.frequency(path.motion_at(self._time)[0])
+        for first, last in self.closer:
+            away = np.maximum(first - self._time, self._time - last) / _AROUND
+            frequency *= 1.0 + (_CLOSER - 1.0) * np.clip(1.0 - away, 0.0, 1.0)
+        done = cumulative_trapezoid(frequency, self._time, initial=0.0)
         self.count = max(1, int(np.ceil(done[-1] - rule.lengthened)))
         # Where the body rests nothing is done; a little keeps the inverse unique.
         done += 1e-9 * (self._time - begin)
@@ -241,6 +275,33 @@ class _Cuts:
         return max(rule.double_share - rule.double_fall * float(way) / taken, rule.double_least)
 
 
+def _roomy_steps(
+    cuts: _Cuts, room: FootRoom, stands: Mapping[str, FloatArray], ends: Mapping[str, FloatArray] | None
+) -> tuple[_Cuts, list[_Placed]]:
+    """Steps of a stretch with as much room as there is, and the cuts on which they are."""
+    found: list[tuple[float, _Cuts, list[_Placed]]] = []
+    for _ in range(_ROUNDS):
+        steps = list(_steps(cuts, room, stands, ends or cuts.ends()))
+        short = [step for step in steps if step.lack > 0.0]
+        found.append((sum(step.lack for step in short), cuts, steps))
+        if not short:
+            break
+        tight = [(cuts.time(max(step.number - 2.0, 0.0)), cuts.time(step.number)) for step in short]
+        cuts = _Cuts(cuts.path, cuts.rule, cuts.begin, cuts.end, (*cuts.closer, *_merged(tight)))
+    return min(found, key=lambda item: item[0])[1:]
+
+
+def _merged(intervals: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Intervals as their union."""
+    merged: list[tuple[float, float]] = []
+    for first, last in sorted(intervals):
+        if merged and first <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(last, merged[-1][1])
+        else:
+            merged.append((first, last))
+    return merged
+
+
 def _leading(cuts: _Cuts) -> str:
     """The foot on the side to which the first step goes, or the left one."""
     before, after = cuts.place(0.0), cuts.place(1.0)
@@ -257,10 +318,12 @@ def _beside(foot: str, place: FloatArray, width: float, splay: float) -> FloatAr
 
 
 def _steps(
-    cuts: _Cuts, rule: StepRule, stands: Mapping[str, FloatArray], ends: Mapping[str, FloatArray]
+    cuts: _Cuts, room: FootRoom, stands: Mapping[str, FloatArray], ends: Mapping[str, FloatArray]
 ) -> Iterator[_Placed]:
     """Steps from where the feet stand, until both are where they end."""
-    feet, first = dict(stands), _leading(cuts)
+    feet, first, rule = dict(stands), _leading(cuts), cuts.rule
+    # Where feet have to stand near an obstacle, steps from there and to there have no more room.
+    given = {foot: min(room.at(stands[foot]), room.at(ends[foot])) for foot in FEET}
     order = itertools.cycle((first, *(foot for foot in FEET if foot != first)))
     for number, foot in enumerate(order, start=1):
         if all(np.abs(feet[each] - ends[each]).max() < _REACHED for each in FEET):
@@ -271,9 +334,28 @@ def _steps(
         passed = _beside(foot, cuts.place(number), rule.width, rule.splay)
         wanted = passed if number < cuts.count else ends[foot]
         placed = within_reach(wanted, other, SIDE[foot], rule)
+        least = min(FOOT_ROOM, given[foot] - _REACHED)
+        left = float(room.beside(feet[foot], placed[None])[0])
+        if left < least and number < cuts.count:
+            tried = _tried(cuts, number, foot, other)
+            rooms = room.beside(feet[foot], tried)
+            best = int(np.argmin(np.where(rooms < least, 100.0 - rooms, _EFFORT)))
+            placed, left = tried[best], float(rooms[best])
         if np.abs(placed - feet[foot]).max() > _REACHED:
             feet[foot] = placed
-            yield _Placed(number, foot, placed)
+            yield _Placed(number, foot, placed, max(least - left, 0.0))
+
+
+def _tried(cuts: _Cuts, number: int, foot: str, other: FloatArray) -> FloatArray:
+    """(k, 3) places of a foot near to where the body passes it, beside the other foot at ``other`` (3,)."""
+    rule, tried = cuts.rule, []
+    for back, aside, turned in _TRIED.tolist():
+        x, y, heading = cuts.place(number - back)
+        moved = np.array([x - aside * np.sin(heading), y + aside * np.cos(heading), heading])
+        passed = _beside(foot, moved, rule.width, rule.splay)
+        passed[2] += turned
+        tried.append(within_reach(passed, other, SIDE[foot], rule))
+    return np.array(tried)
 
 
 def within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepRule) -> FloatArray:

@@ -25,15 +25,24 @@ from manikin.pipeline.stages.walking_stage import (
 )
 from manikin.runtime.requirement import Requirement, requirement_table
 from manikin.scenarios.world import flat_sequence
+from manikin.scene import Scene
+from manikin.scene.distance import Proximity, segment_of
 from manikin.simulation import Execution
 from manikin.walking.footprints import FEET, Footprints
 from manikin.walking.gait.balanced_walk import BalancedWalk, balanced_walk
+from manikin.walking.path.walk_obstacles import in_the_way
 
 REACHED = 2e-3
 """A foot is where it should be when its ankle is this near to its place [m]."""
 
 BEYOND = float(np.radians(1.0))
 """Most that a hinge of the plan may be beyond its range, where it is cut off [rad]."""
+
+CLEAR = 0.01
+"""Least distance of any part of the body from what stands there [m], for what the execution differs."""
+
+PLACES = {"missed_m": "legs", "beyond_range_rad": "legs", "min_room_m": "way of the body"}
+"""What the requirements of a walk are about."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +119,14 @@ def _walked(
         return None
     height, rule = context.scene.floor_height or 0.0, walking.StepRule().scaled(context.body.stature or 1.75)
     with context.scenario.refusing(("walking",)):
-        stepped = walking.step_along(plan.route, rule, ends=ends, height=height)
-        walk = balanced_walk(context.body, stepped, friction=FRICTION, end=last)
+        others = Scene(in_the_way(context.scene, context.body.stature or 2.0), None)
+        stepped = walking.step_along(plan.route, rule, ends=ends, height=height, obstacles=plan.obstacles)
+        walk = balanced_walk(context.body, stepped, friction=FRICTION, end=last, scene=others)
     report.progress(STAGE, 0.6)
     keep_paths(report, plan, stepped)
     block = path_block(plan, stepped)
+    beside = _clearance(walk, others)
+    block["min_clearance_m"] = None if beside is None else beside.measured
     report.finish(STAGE, block | _measures(walk, stepped.footprints))
     table = requirement_table([
         Requirement("missed_m", "distance of a foot from its place, out of reach", "m", walk.missed, "<=",
@@ -122,12 +134,24 @@ def _walked(
         Requirement("beyond_range_rad", "angle of a hinge beyond its range", "rad", walk.excess,
                     "<=", BEYOND),
         None if block["min_room_m"] is None else room_requirement(context, block["min_room_m"]),
+        beside,
     ])  # fmt: skip
     report.require(STAGE, table)
     if (broken := table.first_broken) is not None:
-        report.fail(STAGE, broken.reason, where="way of the body" if broken.key == "min_room_m" else "legs")
+        report.fail(STAGE, broken.reason, broken.time_s or 0.0, PLACES.get(broken.key, broken.where))
     walk_others(context, report, plan)
     return walk
+
+
+def _clearance(walk: BalancedWalk, scene: Scene) -> Requirement | None:
+    """That no part of the body meets what stands there, at any sample; None where nothing does."""
+    if not len(scene):
+        return None
+    motion = walk.motion
+    found = Proximity(walk.body, scene, self_collision=False).minimum_over(motion.q, tolerance=1e-4)
+    pair = found.pair or ("", "")
+    return Requirement("min_clearance_m", "distance", "m", found.distance, ">=", CLEAR,
+                       float(motion.time[found.sample]), f"{segment_of(pair[0])} from {pair[1]}")  # fmt: skip
 
 
 def _measures(walk: BalancedWalk, footprints: Footprints) -> dict[str, Any]:

@@ -5,6 +5,7 @@ Walks that are executed are those of :mod:`~manikin.pipeline.stages.walking_exec
 
 import math
 import time as clock
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +16,7 @@ from manikin.balance import wrench_polytopes
 from manikin.balance.motion_forces import full_motion
 from manikin.contact import Contact, ContactSchedule, default_normal_force_cap, sole
 from manikin.contact.from_motion import schedule_of_support
-from manikin.errors import BodyError, InputError
+from manikin.errors import BodyError, InputError, ScenarioError
 from manikin.motion import Motion
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import FloatArray
@@ -64,6 +65,10 @@ def walked_schedule(walk: Walk, height: float) -> ContactSchedule:
     cap = default_normal_force_cap(body.mass)
     return schedule_of_support(walk.time, walk.support, lambda *touching: contacts[touching], cap)
 
+
+WHOLE = walking.Walker(depth=0.36, width=0.6)
+"""Extent of a body that is executed: its trunk, swaying, with its arms drawn in, and its feet. Where it has
+no way, the extent of the shoulders alone is kept, and what the body meets is measured."""
 
 STAGE = "walk"
 PATH_EVERY = 5
@@ -151,6 +156,8 @@ def plan_walks(
 ) -> PlannedWalks:
     """Find a route for every walker, each around those before.
 
+    That of a body that is executed keeps room for the whole of it where it can, see :data:`WHOLE`.
+
     Args:
         start: (3,) x, y [m], heading [rad] of the body; that of the task if omitted.
         goal: The same at the end.
@@ -165,12 +172,13 @@ def plan_walks(
     obstacles, others = list(standing), {}
 
     def route_of(
-        key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, *goal: Waypoint
-    ) -> WalkRoute:
+        key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, *goal: Waypoint,
+        walker: walking.Walker | None = None,
+    ) -> WalkRoute:  # fmt: skip
         stops = [*(Waypoint(place_of(stop), stop.speed_m_s, stop.wait_s) for stop in who.via), *goal]
         with scenario.refusing(key):
             return walking.walking_route(
-                begin, stops, objective, obstacles=obstacles, room=section.room_m,
+                begin, stops, objective, obstacles=obstacles, walker=walker, room=section.room_m,
                 max_speed=who.max_speed_m_s, wait=who.wait_s,
             )  # fmt: skip
 
@@ -182,7 +190,12 @@ def plan_walks(
     began = clock.perf_counter()
     start = end_of(scenario, "start") if start is None else start
     goal = end_of(scenario, "goal") if goal is None else goal
-    route = route_of(("walking",), section, start, Waypoint(goal))
+    route = None
+    if section.whole_body == "balanced":
+        with suppress(ScenarioError):  # an end leaves no room for it
+            route = route_of(("walking",), section, start, Waypoint(goal), walker=WHOLE)
+    if route is None or not route.succeeded:
+        route = route_of(("walking",), section, start, Waypoint(goal))
     return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began)
 
 

@@ -27,8 +27,10 @@ from manikin.kinematics.leg_kinematics import LegKinematics
 from manikin.motion import Motion
 from manikin.numerics.signals import least_jerk, low_passed
 from manikin.numerics.spatial import GRAVITY, FloatArray, cross, finite_number, quaternions, rotations
+from manikin.scene import Scene
 from manikin.walking.footprints import FEET, Footprints
 from manikin.walking.gait.blend import Gait
+from manikin.walking.gait.drawn_arms import DrawnArms
 from manikin.walking.gait.motion_library import MotionLibrary, load_library
 from manikin.walking.gait.rolling_steps import RollingFoot, RollRule, rolling_schedule
 from manikin.walking.stepper import LEAD, SteppedPath
@@ -51,6 +53,9 @@ STYLE_CUTOFF, HEIGHT_CUTOFF, MOMENTUM_CUTOFF = 6.0, 5.0, 15.0
 
 PASSES, PLACED = 6, 1e-5
 """Rounds of whole-body motion and centre of mass; error of the latter at which a round ends [m]."""
+
+LOOKS = 3
+"""Rounds after which arms are looked at, and drawn in where they are too near to something."""
 
 _PADDING = 50
 
@@ -84,9 +89,12 @@ class BalancedWalk:
 
 def balanced_walk(
     body: BodyModel, stepped: SteppedPath, *, friction: float = 0.8, end: FloatArray | None = None,
-    rule: RollRule | None = None, library: MotionLibrary | None = None,
+    rule: RollRule | None = None, library: MotionLibrary | None = None, scene: Scene | None = None,
 ) -> BalancedWalk:  # fmt: skip
     """Walk on footprints along the path that they were placed on, in balance.
+
+    Arms that would come too near to what stands in the scene are drawn in there; footprints and path are as
+    they are, so that what the body meets is to be measured.
 
     Args:
         body: A human.
@@ -95,6 +103,7 @@ def balanced_walk(
         end: (nq,) posture on both feet with which the walk ends; standing as the library's when omitted.
         rule: How feet roll; as people's when omitted.
         library: Cycles; those that come with this package if omitted.
+        scene: What stands there.
 
     Raises:
         InputError: If the footprints have no step.
@@ -104,8 +113,11 @@ def balanced_walk(
         raise InputError("footprints have no step; valid: at least one")
     friction = finite_number(friction, "friction of the soles", above=0.0)
     plan = _Plan(body, stepped, end, rule or RollRule(), library or load_library())
-    for _ in range(PASSES):
+    arms = None if scene is None else DrawnArms(body, scene, plan.time)
+    for done in range(PASSES):
         plan.improve()
+        if arms is not None and done < LOOKS and arms.look(plan.q):
+            plan.draw_in(arms)
     return plan.result(friction)
 
 
@@ -170,6 +182,12 @@ class _Plan:
         yaw, pitch, roll = smooth[:, 0], smooth[:, 1], smooth[:, 2]
         self.pelvis, self.turn = rotations(yaw, pitch, roll), quaternions(yaw, pitch, roll)
         self.origin, self.angles = smooth[:, 3:6], smooth[:, 6:]
+        self.swinging = self.angles
+
+    def draw_in(self, arms: DrawnArms) -> None:
+        """Draw in the arms, but for the posture in which the walk has to end."""
+        free = np.ones(len(self.time)) if self.last is None else 1.0 - self.settled
+        self.angles = arms.applied(self.swinging, free)
 
     def improve(self) -> None:
         """One round: centre of mass over the ZMP, the body with it, and what that changes."""

@@ -171,7 +171,14 @@ def floor_plan(scene: Scene, height: float) -> tuple[WalkObstacle, ...]:
     """Discs and convex polygons that a body of a height [m] has to walk around, on a level floor.
 
     Each is the convex hull of an obstacle seen from above, even where only a part of the obstacle is in the
-    way. What hangs above the head and what lies flat on the floor are left out.
+    way. What hangs above the head and what lies flat on the floor are left out. Raises as
+    :func:`in_the_way`.
+    """
+    return tuple(_outline(item) for item in in_the_way(scene, height))
+
+
+def in_the_way(scene: Scene, height: float) -> tuple[Obstacle, ...]:
+    """Obstacles that a body of a height [m] has to walk around, on a level floor.
 
     Raises:
         InputError: If the scene has no floor, or an endless obstacle other than a level one below it.
@@ -180,7 +187,7 @@ def floor_plan(scene: Scene, height: float) -> tuple[WalkObstacle, ...]:
         raise InputError("scene has no floor; valid: floor_height_m, to walk on")
     low, high = scene.floor_height + STEPPED_ON, scene.floor_height + height
     return tuple(
-        _outline(item)
+        item
         for item in scene
         if not _is_floor(item, low) and item.bounds[1][2] > low and item.bounds[0][2] < high
     )
