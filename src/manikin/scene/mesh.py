@@ -1,4 +1,4 @@
-"""Triangle meshes in metres: checked arrays, and reading STL, OBJ, PLY and DAE files."""
+"""Triangle meshes in metres: checked arrays, and reading STL, OBJ, PLY, DAE, GLB and glTF files."""
 
 import re
 from dataclasses import dataclass
@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike
 
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray, area_normals, finite_number, frozen_array
+from manikin.scene.gltf import read_gltf
 from manikin.scene.triangles import IntArray, decimated
 
 Convexity = Literal["no", "hull", "parts"]
 
-FORMATS = ("stl", "obj", "ply", "dae")
+FORMATS = ("stl", "obj", "ply", "dae", "glb", "gltf")
 _FORMATS_TEXT = ", ".join(f".{name}" for name in FORMATS)
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Units a mesh file may be said to be in, in metres."""
@@ -157,17 +158,18 @@ def load_mesh(
     path: str | Path, *, unit: str | None = None, up: str | None = None, scale: float = 1.0,
     convex: Convexity = "no",
 ) -> Mesh:  # fmt: skip
-    """Read an STL, OBJ, PLY or DAE file, as its extension says, into metres; SceneError if unusable.
+    """Read a mesh file of one of :data:`FORMATS`, as its extension says, into metres; SceneError if unusable.
 
     A file of more than :data:`MAX_FACES` triangles is decimated to so many, unless convex hulls take its
     place (:func:`manikin.scene.triangles.decimated`); its vertices are then :data:`LARGEST_DEVIATION` from
-    the surface at most.
+    the surface at most. GLB and glTF files are in metres and y up, which is turned to z up about x; all
+    meshes of the scene are one, each where its nodes place it (:mod:`manikin.scene.gltf`).
 
     Args:
         path: The file, or ``package://NAME/path`` of an installed distribution.
-        unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``; when omitted, a DAE file's own, else metres.
+        unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``; when omitted, that of a DAE or glTF file, else metres.
         up: Axis of the file that points up, ``"x"``, ``"y"`` or ``"z"``; the mesh is turned so that it is z.
-            When omitted, a DAE file's own, else z.
+            When omitted, that of a DAE file, y of a glTF file, else z.
         scale: Further factor on every coordinate, > 0.
         convex: As for :class:`Mesh`.
     """
@@ -183,19 +185,18 @@ def load_mesh(
         raise SceneError(f"mesh file '{file}' up is {up!r}; valid: {', '.join(_UP_TO_Z)}")
     factor = finite_number(scale, f"mesh file '{file}' scale", above=0.0, error=SceneError)
     _check_size(file, extension)
-    loaded = _read(file, extension)
-    own_up, own_metres = _collada_asset(file) if extension == "dae" else ("z", 1.0)
-    metres = own_metres if unit is None else UNITS[unit]
-    vertices = frozen_array(loaded.vertices, f"mesh file '{file}' vertices", (None, 3), SceneError)
+    corners, faces = _read(file, extension)
+    own_up, own_metres = _own_axis_and_unit(file, extension)
+    metres = (own_metres or 1.0) if unit is None else UNITS[unit]
+    vertices = frozen_array(corners, f"mesh file '{file}' vertices", (None, 3), SceneError)
     points = vertices @ _UP_TO_Z[up or own_up].T * (metres * factor)
     extent = float(np.ptp(points, axis=0).max())
-    if unit is None and extension != "dae" and extent > LARGEST_UNSAID:
+    if unit is None and own_metres is None and extent > LARGEST_UNSAID:
         raise SceneError(
             f"mesh file '{file}' extends over {extent:.4g} m if its unit is the metre, and "
             f"{extent / 1e3:.4g} m if it is the millimetre; valid: at most {LARGEST_UNSAID:g} m, or say its "
             f"unit: {', '.join(UNITS)}"
         )
-    faces = np.asarray(loaded.faces, dtype=np.int64)
     if convex == "no" and len(faces) > MAX_FACES:
         points, faces = _decimated(points, faces, str(file))
     return Mesh(points, faces, str(file), convex=convex)
@@ -206,20 +207,27 @@ def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices=vertices, faces=faces, process=False, validate=False)
 
 
-def _read(file: Path, extension: str) -> trimesh.Trimesh:
+def _read(file: Path, extension: str) -> tuple[FloatArray, IntArray]:
+    """Vertices and triangles as they are in the file."""
     try:
-        # As it is in the file: processing would drop vertices that are not finite without a word.
-        scene: Any = trimesh.load_scene(str(file), file_type=extension, process=False)
-        mesh = scene.to_mesh() if scene.geometry else None
+        if extension in ("glb", "gltf"):
+            vertices, faces = read_gltf(file, max_faces=MAX_FILE_FACES, max_bytes=MAX_FILE_BYTES)
+        else:
+            # As it is in the file: processing would drop vertices that are not finite without a word.
+            scene: Any = trimesh.load_scene(str(file), file_type=extension, process=False)
+            mesh = scene.to_mesh() if scene.geometry else trimesh.Trimesh()
+            vertices, faces = mesh.vertices, mesh.faces
+    except SceneError:
+        raise
     except Exception as error:  # a reader may raise anything on a broken file
         reason = " ".join(str(error).split())[:120]
         raise SceneError(
             f"mesh file '{file}' cannot be read ({type(error).__name__}: {reason}); "
             f"valid: a well-formed {_FORMATS_TEXT} file"
         ) from None
-    if mesh is None or not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+    if not len(faces):
         raise SceneError(f"mesh file '{file}' holds no triangles; valid: at least one")
-    return mesh
+    return np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
 
 
 def _check_size(file: Path, extension: str) -> None:
@@ -270,6 +278,13 @@ def _decimated(points: FloatArray, faces: IntArray, source: str) -> tuple[FloatA
             "is needed of it, or set convex to 'parts'"
         )
     return fewer, left
+
+
+def _own_axis_and_unit(file: Path, extension: str) -> tuple[str, float | None]:
+    """Axis of a file that points up and its unit [m], None where it has none."""
+    if extension == "dae":
+        return _collada_asset(file)
+    return ("y", 1.0) if extension in ("glb", "gltf") else ("z", None)
 
 
 def _collada_asset(file: Path) -> tuple[str, float]:

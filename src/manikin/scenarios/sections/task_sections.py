@@ -162,7 +162,7 @@ class ObstacleSection(Section):
         "outward normal of a solid half-space at position, turned by rpy_deg"
     )
     mesh: Text | None = optional(
-        "STL, OBJ, PLY or DAE file, relative to this file's folder; or package://NAME/path of an "
+        "STL, OBJ, PLY, DAE, GLB or glTF file, relative to this file's folder; or package://NAME/path of an "
         "installed Python distribution"
     )
     scale: Positive | None = optional("factor on the mesh's coordinates (default 1)")
