@@ -156,6 +156,7 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["compare", ".", "."], "is not a run directory"),
         (["run", "all", "--variant", "slippery"], "--variant does not go with this run"),
         (["run", "all", "--set", "seed=1"], "--set does not go with this run"),
+        (["run", "all", "--uncertainty", "2"], "--uncertainty does not go with this run"),
         (["run", "all", "--seed", "-1"], "seed is -1"),
         (["run", "all", "--jobs", "0"], "--jobs"),
         (["run", "platform", "--jobs", "2"], "--jobs does not go with this run"),

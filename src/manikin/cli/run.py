@@ -58,7 +58,8 @@ def run(
     if scenario == ALL:
         console.refuse(variant is not None, "--variant", "every variant is run")
         loaded = load_hand if load_kg is None else load_kg
-        single = {"--set": overrides or None, "--moved": moved, "--trials": trials, "--load-kg": loaded}
+        single = {"--set": overrides or None, "--moved": moved, "--trials": trials, "--load-kg": loaded,
+                  "--uncertainty": uncertainty}  # fmt: skip
         console.refuse_given(single, "it belongs to one scenario")
         return _run_all(out, seed, body, context.obj, draw=figures, workers=jobs, json=json)
     console.refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
