@@ -437,3 +437,15 @@ def test_knots_are_doubled_where_a_contact_is_missed_also_far_from_key_instants(
         assert widest[1] == pytest.approx(0.5 * widest[0])
         far = np.abs(dense[:, None] - [*later.instants, at]).min(axis=1) > 0.2
         assert set(dense[far]) <= set(plain)
+
+
+@pytest.mark.parametrize(("below", "unsampled"), [(0.5e-3, False), (5e-3, True)])
+def test_a_clearance_that_is_missed_between_samples_asks_for_more_of_them(step_attempt, below, unsampled):
+    """A sole that flies by an edge in less than the time between two samples is seen by no weight."""
+    time = step_attempt.certificate["min_clearance_m"].time_s
+    seen = step_attempt.fit.clearance_beside(step_attempt.result.spline, time)
+    row = replace(step_attempt.certificate["min_clearance_m"], measured=seen - below, limit=seen)
+    rows = tuple(row if item.key == row.key else item for item in step_attempt.certificate)
+    attempt = replace(step_attempt, certificate=replace(step_attempt.certificate, rows=rows))
+    assert bool(attempt.unsampled) == unsampled
+    assert len(attempt.finer(attempt.unsampled)) == unsampled

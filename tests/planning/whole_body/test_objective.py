@@ -104,3 +104,16 @@ def test_shifting_the_tasks_equals_linearising_with_the_shift(setup, person):
     direct = objective.linearise(points, FitScales(), shift)
     assert moved.cost == pytest.approx(direct.cost, rel=1e-12)
     np.testing.assert_allclose(moved.gradient[0], direct.gradient[0], rtol=1e-9, atol=1e-6)
+
+
+def test_the_clearance_beside_an_instant_is_that_of_the_samples_before_and_after_it(setup, person):
+    """As measured posture by posture; to 1e-6 m, the tolerance of a least distance."""
+    targets, basis, points, _, scene = setup
+    proximity = Proximity(person, scene)
+    objective = MotionObjective(person, proximity, targets, basis)
+    q = objective._sampled(points).states.q
+    before = 2
+    instant = 0.5 * float(targets.time[before] + targets.time[before + 1])
+    least = min(proximity.minimum(row).distance for row in q[before : before + 2])
+    assert objective.clearance_beside(points, instant) == pytest.approx(least, abs=1e-6)
+    assert MotionObjective(person, None, targets, basis).clearance_beside(points, instant) == np.inf

@@ -96,6 +96,10 @@ class MotionFit:
         points, state, constrained = self._constrain(points, scales)
         return self._exact(points, state, scales, iterations + constrained)
 
+    def clearance_beside(self, spline: ConfigurationSpline, time: float) -> float:
+        """Least distance at the samples on both sides of an instant [m], see :meth:`.MotionObjective`."""
+        return self._objective.clearance_beside(spline.control_points, time)
+
     def _constrain(
         self, points: FloatArray, scales: MotionScales
     ) -> tuple[FloatArray, FitLinearisation, int]:

@@ -26,6 +26,9 @@ from manikin.scene.distance import segment_of
 CLEARANCE = frozenset({"min_clearance_m"})
 """Key of the clearance in a certificate."""
 
+DIP = 1e-3
+"""Least by which a clearance between two samples is below those at both, to ask for more samples [m]."""
+
 FORCES = frozenset({"max_missing_wrench", "max_torque_share"})
 """Keys of the requirements on forces. A first fit does not know the strength, and has sudden momentum."""
 
@@ -121,6 +124,15 @@ class FitAttempt(Generic[G]):
         """Whether the clearance that is missed is one of these segments'."""
         near = {segment_of(shape) for shape in self.certificate.closest_pair}
         return bool(self.broken & CLEARANCE) and not near.isdisjoint(segments)
+
+    @property
+    def unsampled(self) -> frozenset[str]:
+        """The clearance, if it is missed between the samples of the fit alone: no weight finds that."""
+        worst = self.certificate.worst(CLEARANCE)
+        if worst is None or worst.time_s is None:
+            return frozenset()
+        seen = self.fit.clearance_beside(self.result.spline, worst.time_s)
+        return CLEARANCE if seen - worst.measured > DIP else frozenset()
 
     def finer(self, keys: Collection[str]) -> Places:
         """:attr:`fine` with the place where most is missed of some requirements that are broken."""

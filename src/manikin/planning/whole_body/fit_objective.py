@@ -21,7 +21,7 @@ from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_strength import HeldForces, excess_torque
 from manikin.planning.whole_body.fit_targets import EffectorTarget, FitTargets
 from manikin.scene import Proximity
-from manikin.scene.distance import ProximitySamples
+from manikin.scene.distance import PlacedShapes, ProximitySamples
 from manikin.scene.distance_bounds import KnownDistances
 
 LEAST_ROLL = 2.0e-3
@@ -158,6 +158,16 @@ class MotionObjective:
         if self.targets.strength:
             states = self._sampled(points).states
             self._forces = HeldForces.of(self._body, self.targets.schedule, self.targets.time, states)
+
+    def clearance_beside(self, points: FloatArray, time: float) -> float:
+        """Least distance of what counts at the samples beside an instant [m]; infinite if all is far."""
+        after = int(np.clip(np.searchsorted(self.targets.time, time), 1, len(self.targets.time) - 1))
+        if self._proximity is None:
+            return np.inf
+        shapes, rows = self._sampled(points).shapes, slice(after - 1, after + 1)
+        both = PlacedShapes(shapes.placements[rows], shapes.jacobians[rows])
+        ignored = self._ignored if isinstance(self._ignored, frozenset) else self._ignored[rows]
+        return float(self._proximity.evaluate_placed(both, ignore=ignored).distance.min(initial=np.inf))
 
     def _sampled(self, points: FloatArray) -> MotionSamples:
         """The spline at its samples; those of the last one, when only the scales have changed since."""

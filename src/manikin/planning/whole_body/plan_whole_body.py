@@ -406,7 +406,7 @@ class _Planner:
             return replace(self.job.restart(last), fine=last.fine)
         if last.fine and broken & INEXACT:
             return None
-        inexact, weak = bool(broken & INEXACT), "max_torque_share" in broken
+        exact, weak = INEXACT | last.unsampled, "max_torque_share" in broken
         if weak:  # where a contact made at speed still settles, only the momentum decides the torques
             when, names = last.certificate["max_torque_share"].time_s or 0.0, goal.schedule.sequence.effectors
             if any(goal.schedule.settling(when, name)[0] for name in names):
@@ -414,8 +414,8 @@ class _Planner:
         scales = self.job.updated(last.scales, broken, narrow=number > 0)
         if weak:
             scales = replace(scales, strength_share=scales.strength_share - STRENGTH_STEP)
-        if inexact:
-            return self.job.attempt(goal, scales, last.finer(INEXACT), last.result.spline)
+        if broken & exact:
+            return self.job.attempt(goal, scales, last.finer(exact), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
 
     def _guide(

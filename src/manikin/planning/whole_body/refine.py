@@ -320,7 +320,7 @@ class Refinement:
         if len(last.fine) == 2 and broken <= _EXACT:  # is out of reach
             return None
         # How often the spline's knots near the key instants are doubled at most.
-        fine = last.finer(_EXACT) if len(last.fine) < 2 else last.fine
+        fine = last.finer(_EXACT | last.unsampled) if len(last.fine) < 2 else last.fine
         if not slower and fine == last.fine:
             return job.improve(last, scales)
         near = last.result.spline
