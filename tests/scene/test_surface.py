@@ -31,6 +31,19 @@ def test_a_mesh_box_has_the_faces_of_the_box():
         assert np.allclose(same.centre, face.centre)
 
 
+def test_blocks_of_one_mesh_that_stand_against_each_other_are_read(tmp_path):
+    """Their common side is there twice, turned either way; of a reader of OBJ files half of each was left."""
+    sides = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6)]
+    corners = [(x, y, z) for z in (0.0, 0.4) for y in (0.0, 3.0) for x in (0.0, 0.3)]
+    lines = [f"v {x + 0.3 * k} {y} {z}" for k in (0, 1) for x, y, z in corners]
+    lines += ["f " + " ".join(str(corner + 8 * k) for corner in side) for k in (0, 1) for side in sides]
+    (tmp_path / "blocks.obj").write_text("\n".join(lines))
+    faces = faces_of(Obstacle("blocks", load_mesh(tmp_path / "blocks.obj")))
+    for normal, area in (((0, 0, 1), 1.8), ((0, 1, 0), 0.24)):
+        assert np.isclose(sum(face.area for face in faces if np.allclose(face.normal, normal)), area)
+    assert np.isclose(min(face.centre[0] for face in faces if np.allclose(face.normal, (-1, 0, 0))), 0.0)
+
+
 def test_an_l_shaped_facet_keeps_its_notch():
     """A concave polygon, extruded: points in the notch are outside."""
     corners = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], dtype=float)

@@ -199,12 +199,13 @@ def _endless(obstacle: Obstacle, shape: Plane | HalfSpace) -> tuple[Surface, ...
 def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
     """Coplanar triangles that touch, each group as one polygon or several, with its holes.
 
-    Open pieces are seen from the side their triangles turn to.
+    Open pieces are seen from the side their triangles turn to.  The common face of two blocks that stand
+    against each other may have triangles of either side.
     """
     surfaces: list[Surface] = []
     for piece in mesh.pieces:
         whole = as_trimesh(obstacle.to_world(piece.vertices), piece.faces)
-        groups = [np.asarray(group) for group in whole.facets]
+        groups = [side for facet in whole.facets for side in _sides(np.asarray(facet), whole.face_normals)]
         grouped = np.concatenate(groups) if groups else np.zeros(0, dtype=np.int64)
         groups += [np.array([face]) for face in np.setdiff1d(np.arange(len(piece.faces)), grouped)]
         for group in groups:
@@ -218,6 +219,12 @@ def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
                 union = shapely.union_all([frame.flat(ring) for ring in triangles], grid_size=GRID)
                 surfaces += frame.surfaces(union, (obstacle.name,))
     return tuple(surfaces)
+
+
+def _sides(group: NDArray[np.int64], normals: FloatArray) -> list[NDArray[np.int64]]:
+    """Coplanar triangles parted by the side that they turn to."""
+    turned = normals[group] @ normals[group[0]] > 0.0
+    return [group] if turned.all() else [group[turned], group[~turned]]
 
 
 GRID = 1e-9

@@ -250,6 +250,33 @@ def test_a_step_that_no_leg_can_make_is_explained():
     assert found.searches <= 62
 
 
+@pytest.mark.parametrize(
+    ("depth", "width", "reason"),
+    [
+        (0.3, 0.55, None), (1.0, 0.55, None), (None, 0.55, None),
+        (1.0, 1.2, "a gap of about 1.2 m"), (None, 1.2, "a gap of about 1.2 m"),
+    ],
+)  # fmt: skip
+def test_a_trench_is_stepped_over_whatever_its_depth_or_is_too_wide(depth, width, reason):
+    """The bottom of a deep trench is no way, nor does it hide the other bank."""
+    middle = (1.0 + 0.3 + width, -0.05)
+    scene = Scene(
+        [
+            Obstacle("bank", Box((2.0, 3.0, 0.1)), translation=(-0.7, 0.0, -0.05)),
+            Obstacle("other", Box((2.0, 3.0, 0.1)), translation=(middle[0], 0.0, middle[1])),
+        ],
+        None if depth is None else -depth,
+    )
+    ends, poser = Endpoints(PostureFinder(BODY, scene), 0.7), PostureFinder(BODY, scene)
+    start, goal = (
+        ends.find(np.array([x, 0.0]), 0.0, Habit.STANDING, height=0.0).stage for x in (0.0, middle[0])
+    )
+    search = WalkSearch(poser, start, goal).search
+    assert (search.best() is not None) is (reason is None)
+    why = search.walled_off()
+    assert why is None if reason is None else reason in why
+
+
 def test_a_hand_joins_where_feet_alone_do_not_make_a_step(checked):
     """Up a block of 0.75 m beside a rail: each change is of one contact, and rest is within the strength."""
     scene = Scene([

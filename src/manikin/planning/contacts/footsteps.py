@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from manikin.kinematics.step_reach import StepReach
@@ -47,11 +47,12 @@ ACROSS = (0.15, 0.19, 0.26, 0.36, 0.48)
 TURNS = (-0.26, 0.0, 0.26, 0.52, 0.87)
 """Steps that are tried from a foot: ahead and to its side [m], and turned outwards [rad]."""
 CELL = 0.1  # width of the cells of the ground on which the estimate is computed [m]
-GAP = 0.7  # longest way over no ground that the estimate takes [m]
+GAP = 0.85  # longest way between cells over no ground that the estimate takes [m]
 MERGED = 0.06
 MERGED_TURN = math.radians(15.0)  # places [m] and headings [rad] this close together count as one foothold
 LOW_STEP = 0.05  # distance of places on a way for one who crawls [m]
 LOW_RISE = 0.2  # largest difference in height of its cells [m]
+WIDEST = 3.0  # widest gap that is told as the reason why no way leads to the goal [m]
 BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothing may stand in it
 GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.  They bound
@@ -313,16 +314,18 @@ class _Field:
         covered[:-1] = (rows[1:] == rows[:-1]) & (np.diff(height) < 0.45)
         points = np.column_stack([grid[rows], height])[~covered]
         self._points = points = points[column_is_free(scene, points, column)]
+        self._column_is_free = lambda places: column_is_free(scene, places, column)
         slow, size = np.ones(len(points)), len(points)
         for share, more in ((1.35, 0.8), (1.8, 0.5)):
             slow[~column_is_free(scene, points, (*column[:2], share * column[2]))] += more
         self._tree = cKDTree(points)
         near = cKDTree(points[:, :2]).query_pairs(1.6 * CELL, output_type="ndarray")
-        # Over gaps: cells at the edge of the ground reach farther.
-        edge = np.flatnonzero(np.bincount(near.ravel(), minlength=size) < 8)
+        # Over gaps: cells at the edge of the ground, and of what is far above it, reach farther.
+        beside = np.abs(points[near[:, 0], 2] - points[near[:, 1], 2]) <= easy
+        edge = np.flatnonzero(np.bincount(near[beside].ravel(), minlength=size) < 8)
         if len(edge) and gap:
             far = edge[cKDTree(points[edge, :2]).query_pairs(gap, output_type="ndarray")]
-            near = np.vstack([near, far[self._is_open(scene, far, column)]])
+            near = np.vstack([near, far[self._is_open(far)]])
         self._near, away = near, points[near[:, 0]] - points[near[:, 1]]
         self._rise = rise = np.abs(away[:, 2])
         self._pace = pace = STEP * (1.0 + 1.0 / 3.0) / stride
@@ -352,12 +355,12 @@ class _Field:
         ends = np.where(down[faced, None], points[faced, :2], middle[:2])
         self._way = np.linalg.norm(points[:, :2] - ends, axis=1)
 
-    def _is_open(self, scene: Scene, pairs: np.ndarray, column: tuple[float, float, float]) -> np.ndarray:
+    def _is_open(self, pairs: np.ndarray, shares: FloatArray = BETWEEN) -> np.ndarray:
         """(k,) whether the column passes between pairs (k, 2) of cells over what has no ground."""
         ends = self._points[pairs]
         ends[..., 2] = ends[..., 2].max(axis=1, keepdims=True)
-        between = ends[:, :1] + BETWEEN[:, None] * (ends[:, 1:] - ends[:, :1])
-        free = column_is_free(scene, between.reshape(-1, 3), column)
+        between = ends[:, :1] + shares[:, None] * (ends[:, 1:] - ends[:, :1])
+        free = self._column_is_free(between.reshape(-1, 3))
         return np.asarray(free.reshape(len(pairs), -1).all(axis=1))
 
     def way(self, place: FloatArray) -> FloatArray | None:
@@ -371,12 +374,16 @@ class _Field:
         return self._points[rows]
 
     def walled_off(self, place: FloatArray) -> str:
-        """Why no way leads from a place (3,) to the goal: a step that is too high, or no room."""
+        """Why no way leads from a place (3,) to the goal: a gap, a step that is too high, or no room."""
+        row = int(self._tree.query(place)[1])
+        gap = self._widest_gap(row)
+        if gap is not None:
+            most = f"feet make at most {GAP - CELL:.2f} m"
+            return f"every way over the ground has a gap of about {gap:.1f} m; {most}"
         size = len(self._points)
         graph = csr_array((self._rise + 1e-6, (self._near[:, 0], self._near[:, 1])), shape=(size, size))
         way = minimum_spanning_tree(graph)
         costs, before = dijkstra(way, directed=False, indices=self._root, return_predecessors=True)
-        row = int(self._tree.query(place)[1])
         if not math.isfinite(costs[row]):
             return "no way over the ground has room for the body"
         # The way with the lowest highest step is in a minimum spanning tree.
@@ -386,6 +393,29 @@ class _Field:
             row = int(before[row])
         most = f"feet make at most {self._highest:.2f} m"
         return f"every way over the ground has a step of {highest:.2f} m; {most}"
+
+    def _widest_gap(self, row: int) -> float | None:
+        """Widest gap of the way from a cell to the goal whose gaps are narrowest [m].
+
+        None where gaps up to :data:`WIDEST` do not join them: something stands between them.
+        """
+        size, (one, other) = len(self._points), self._near[self._rise <= self._highest].T
+        parts = connected_components(csr_array((np.ones(len(one)), (one, other)), shape=(size, size)))[1]
+        joined, widest = parts == parts[self._root], 0.0
+        while not joined[row]:
+            inside, outside = np.flatnonzero(joined), np.flatnonzero(~joined)
+            tree = cKDTree(self._points[inside])
+            width, near = tree.query(self._points[outside], distance_upper_bound=WIDEST)
+            found = np.flatnonzero(np.isfinite(width))
+            pairs = np.column_stack([inside[near[found]], outside[found]])
+            rise = np.abs(np.diff(self._points[pairs, 2], axis=1)[:, 0])
+            passes = rise <= self._highest
+            passes[passes] = self._is_open(pairs[passes], np.linspace(0.0, 1.0, math.ceil(WIDEST / CELL)))
+            if not passes.any():
+                return None
+            best = found[passes][np.argmin(width[found[passes]])]
+            joined, widest = joined | (parts == parts[outside[best]]), max(widest, float(width[best]) - CELL)
+        return widest
 
     def costs(self, places: FloatArray, yaws: FloatArray) -> FloatArray:
         """(k,) estimates of the costs from places (k, 3) [m] with headings (k,) [rad] to the goal [s]."""
