@@ -361,7 +361,7 @@ class _Field:
         ends[..., 2] = ends[..., 2].max(axis=1, keepdims=True)
         between = ends[:, :1] + shares[:, None] * (ends[:, 1:] - ends[:, :1])
         free = self._column_is_free(between.reshape(-1, 3))
-        return np.asarray(free.reshape(len(pairs), -1).all(axis=1))
+        return np.asarray(free.reshape(len(pairs), len(shares)).all(axis=1))
 
     def way(self, place: FloatArray) -> FloatArray | None:
         """(n, 3) cells from a place (3,) to the goal [m]; None where none lead there."""
