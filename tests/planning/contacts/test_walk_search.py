@@ -246,8 +246,16 @@ def test_a_step_that_no_leg_can_make_is_explained():
     wall = Scene([Obstacle("block", Box((1.0, 2.0, 1.2)), translation=(1.0, 0.0, 0.6))])
     found, _, _ = planned(wall, (1.0, 0.0), searches=60)
     assert found.plan is None
-    assert "walled off" in found.failure
+    assert "has a step of 1.20 m (block)" in found.failure
+    assert "the goal is on block, 1.20 m above the start" in found.failure
     assert found.searches <= 62
+
+
+def test_a_slope_too_steep_to_stand_on_is_told_as_such():
+    slope = Obstacle("slope", Box((4.0, 3.0, 0.2)), rotation_from_rpy(0.0, -np.deg2rad(38.0), 0.0))
+    ends = Endpoints(PostureFinder(BODY, Scene([slope], None)), 0.7)
+    failure = ends.find(np.zeros(2), 0.0, Habit.STANDING).failure
+    assert "slopes by 38 degrees; feet stand on 30 at most" in failure
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,7 @@ class _FootSearch(_ContactSearch):
         walk = self._search
         if found.plan is None and isinstance(walk, WalkSearch) and walk.search.walled_off() is not None:
             self._search, crawl = None, self._crawl(walk, start, goal)
-            found = replace(crawl, failure=f"on hands and knees: {crawl.failure}; on feet: {found.failure}")
+            found = replace(crawl, failure=f"{found.failure}; crawling: {crawl.failure}")
         return self._result(found)
 
     def _crawl(self, walk: WalkSearch, start: Stage, goal: Stage) -> Extension:

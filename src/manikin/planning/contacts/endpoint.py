@@ -27,6 +27,7 @@ SEAT_HEIGHTS = (0.12, 0.40)  # lowest and greatest height of a seat above the fe
 FEET_BEFORE_SEAT = (0.15, 0.225, 0.3)  # places of a floor before the middle of the buttocks [statures]
 LEANT = 0.057  # way of the weight of a body that leans down to put its hands beside it [statures]; our choice
 SITTING_TIME = 0.35  # shortest time for which a body sits before it moves [s]
+STEEP = np.deg2rad(80.0)  # slope up to which a surface is told as too steep, not as missing [rad]
 CROUCH = 0.6  # height of a crouching body's root relative to a standing one's; our choice
 
 
@@ -81,8 +82,16 @@ class Endpoints:
             if posed.q is not None:
                 return Endpoint(Stage.of(self._body, contacts, posed.q, 0.35))
             reasons.append(posed.reason)
-        why = reasons[0] if reasons else "there is no surface with room for both feet"
+        why = reasons[0] if reasons else self._no_place(np.asarray(at), height)
         return Endpoint(None, f"no posture {habit} at {np.round(at, 3).tolist()} m: {why}")
+
+    def _no_place(self, at: FloatArray, height: float | None) -> str:
+        """Why both feet have no place: what is there is too steep, or too small."""
+        slopes = [np.arccos(surface.normal[2]) for _, surface in self._surfaces(at, height, STEEP)]
+        if not slopes or min(slopes) <= self._footholds.steepest:
+            return "there is no surface with room for both feet"
+        slope, most = np.rad2deg([min(slopes), self._footholds.steepest])
+        return f"the surface there slopes by {slope:.0f} degrees; feet stand on {most:.0f} at most"
 
     def _standing(
         self, at: FloatArray, heading: float, habit: Habit, height: float | None
@@ -150,10 +159,12 @@ class Endpoints:
         """Heights of the surfaces below and above a place, the lowest first; those near one given."""
         return sorted({round(level, 6) for level, _ in self._surfaces(at, height)})
 
-    def _surfaces(self, at: FloatArray, height: float | None) -> list[tuple[float, Surface]]:
+    def _surfaces(
+        self, at: FloatArray, height: float | None, steepest: float | None = None
+    ) -> list[tuple[float, Surface]]:
         """Surfaces below and above a place with their heights, the lowest first; those near one given."""
         found: list[tuple[float, Surface]] = []
-        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), self._footholds.steepest):
+        for surface in self._scene.surfaces_facing((0.0, 0.0, 1.0), steepest or self._footholds.steepest):
             base, normal = surface.polygon[0], surface.normal
             level = base[2] - float((at - base[:2]) @ normal[:2]) / normal[2]
             near = height is None or abs(level - height) < 0.05

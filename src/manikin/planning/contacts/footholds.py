@@ -119,6 +119,13 @@ class Footholds:
         on = self._point.place(put.numbers, put.positions, put.rotations).share > 0.5
         return put.rows[on], put.positions[on, 2]
 
+    def below(self, place: FloatArray) -> tuple[str, ...]:
+        """Names of the obstacles whose surface is at a place (3,) [m]; none without a surface."""
+        level = float(place[2])
+        put = self._point.under(place[None, :2], np.zeros(1), level - ON_PLANE, level + ON_PLANE)
+        on = self._point.place(put.numbers, put.positions, put.rotations).share > 0.5
+        return self._table.surfaces[int(put.numbers[on][0])].obstacles if on.any() else ()
+
     def faces(self, one: Foothold, other: Foothold) -> bool:
         """Whether what the higher of two is on goes on beside it, so that the lower one is behind it."""
         low, high = sorted((one, other), key=lambda hold: float(hold.position[2]))

@@ -315,6 +315,7 @@ class _Field:
         points = np.column_stack([grid[rows], height])[~covered]
         self._points = points = points[column_is_free(scene, points, column)]
         self._column_is_free = lambda places: column_is_free(scene, places, column)
+        self._names = footholds.below
         slow, size = np.ones(len(points)), len(points)
         for share, more in ((1.35, 0.8), (1.8, 0.5)):
             slow[~column_is_free(scene, points, (*column[:2], share * column[2]))] += more
@@ -387,12 +388,16 @@ class _Field:
         if not math.isfinite(costs[row]):
             return "no way over the ground has room for the body"
         # The way with the lowest highest step is in a minimum spanning tree.
-        highest = 0.0
+        highest, onto = 0.0, row
         while before[row] >= 0:
-            highest = max(highest, abs(float(self._points[row, 2] - self._points[before[row], 2])))
-            row = int(before[row])
-        most = f"feet make at most {self._highest:.2f} m"
-        return f"every way over the ground has a step of {highest:.2f} m; {most}"
+            pair = row, int(before[row])
+            rise = abs(float(self._points[pair[0], 2] - self._points[pair[1], 2]))
+            if rise > highest:
+                highest, onto = rise, max(pair, key=lambda cell: float(self._points[cell, 2]))
+            row = pair[1]
+        names = ", ".join(self._names(self._points[onto]))
+        step = f"a step of {highest:.2f} m" + (f" ({names})" if names else "")
+        return f"every way with room for the body has {step}; feet make at most {self._highest:.2f} m"
 
     def _widest_gap(self, row: int) -> float | None:
         """Widest gap of the way from a cell to the goal whose gaps are narrowest [m].

@@ -161,7 +161,20 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         if way is not None:
             return way
         why = self.search.walled_off()
-        return f"the goal is walled off from the start: {why}" if why else "no footsteps lead to the goal"
+        if why is None:
+            return "no footsteps lead to the goal"
+        return f"the goal is walled off from the start: {why}{self._ends_apart()}"
+
+    def _ends_apart(self) -> str:
+        """On what start and goal are, where one is far above the other; empty where they are not."""
+        levels = [float(end.contacts[FEET[0]].position[2]) for end in (self.start, self.goal)]
+        if abs(levels[1] - levels[0]) <= HELD_HIGHEST * self._scale:
+            return ""
+        (end, name), other = (self.goal, "goal"), "start"
+        if levels[0] > levels[1]:
+            (end, name), other = (self.start, "start"), "goal"
+        on = ", ".join(self.poser.scene.touched_obstacles(end.contacts[FEET[0]]))
+        return f"; the {name} is on {on}, {abs(levels[1] - levels[0]):.2f} m above the {other}"
 
     def _close(self, move: tuple[int, int]) -> None:
         self.search.refuse(*move)
