@@ -92,8 +92,8 @@ def main() -> None:
     options = parser.parse_args()
     first, _, last = options.seeds.partition("-")
     outcomes = []
-    for seed in range(int(first), int(last or first) + 1):
-        for number in range(GOALS):
+    for number in range(GOALS):
+        for seed in range(int(first), int(last or first) + 1):
             outcomes.append(walked(seed, number, plan=options.plan, folder=options.out))
             print("ok  " if outcomes[-1][0] else "FAIL", outcomes[-1][1], flush=True)
     print(f"{sum(good for good, _ in outcomes)} of {len(outcomes)} walks kept all requirements")

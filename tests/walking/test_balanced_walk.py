@@ -102,7 +102,7 @@ def test_a_walk_ends_in_the_posture_that_is_asked_for(case):
 
 def test_an_arm_is_drawn_in_beside_a_wall(case):
     """The swinging left hand would meet it; drawn in it does not, and the other arm swings as before."""
-    wall = Obstacle("wall", Box((2.0, 0.1, 2.0)), translation=(0.5, 0.38, 1.0))
+    wall = Obstacle("wall", Box((2.0, 0.1, 2.0)), translation=(0.5, 0.42, 1.0))
     scene, body = Scene([wall]), case.walk.body
     drawn = balanced_walk(body, case.stepped, scene=scene)
     proximity = Proximity(body, Scene([wall], None), self_collision=False)

@@ -1,7 +1,8 @@
 """Walking stage of walks that are executed: on people's footprints, in balance, in the physics engine."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from manikin.simulation import Execution
 from manikin.walking.footprints import FEET, Footprints
 from manikin.walking.gait.balanced_walk import BalancedWalk, balanced_walk
 from manikin.walking.path.walk_obstacles import in_the_way
+from manikin.walking.stepper import SteppedPath
 
 REACHED = 2e-3
 """A foot is where it should be when its ankle is this near to its place [m]."""
@@ -40,6 +42,10 @@ BEYOND = float(np.radians(1.0))
 
 CLEAR = 0.01
 """Least distance of any part of the body from what stands there [m], for what the execution differs."""
+
+AGAIN, SPARE = 2, 0.02
+"""How often a walk that comes too near to something is tried again with more room, and with how much more
+room than it lacked [m]."""
 
 PLACES = {"missed_m": "legs", "beyond_range_rad": "legs", "min_room_m": "way of the body"}
 """What the requirements of a walk are about."""
@@ -55,8 +61,7 @@ class ExecutedWalk:
 
 def walk_in_balance(context: RunContext, report: Report, requirements: ExecutionRequirements) -> ExecutedWalk:
     """Find the way of a walking scenario, walk it on people's footprints in balance, and execute that."""
-    plan = plan_walks(context)
-    walk = _walked(context, report, plan)
+    walk = _walked(context, report, lambda further: (plan_walks(context, further=further), None))
     if walk is None:
         return ExecutedWalk()
     report.keep_motions(walk.schedule, walk.motion)
@@ -69,8 +74,10 @@ def walk_in_balance(context: RunContext, report: Report, requirements: Execution
     return ExecutedWalk(walk.motion, execution)
 
 
-def way_before(context: RunContext) -> tuple[PlannedWalks, dict[str, FloatArray]]:
+def way_before(context: RunContext, further: float = 0.0) -> tuple[PlannedWalks, dict[str, FloatArray]]:
     """The way to the first phase of a scenario's supports, and (3,) x, y [m], yaw [rad] of its feet.
+
+    ``further`` is that of :func:`plan_walks`.
 
     Raises:
         ScenarioError: If the way cannot be asked for, or the supports do not begin on both feet.
@@ -84,7 +91,7 @@ def way_before(context: RunContext) -> tuple[PlannedWalks, dict[str, FloatArray]
     places = np.array(list(ends.values()))
     goal = np.append(places[:, :2].mean(axis=0), np.angle(np.exp(1j * places[:, 2]).sum()))
     start = None if section is None or section.start is None else place_of(section.start)
-    return plan_walks(context, start, goal), ends
+    return plan_walks(context, start, goal, further=further), ends
 
 
 def walk_before(context: RunContext, report: Report, planned: PlannedMotion) -> PlannedMotion:
@@ -94,7 +101,7 @@ def walk_before(context: RunContext, report: Report, planned: PlannedMotion) -> 
     """
     if context.scenario.file.walking is None or report.failure is not None:
         return planned
-    walk = _walked(context, report, *way_before(context), planned.motion.q[0])
+    walk = _walked(context, report, partial(way_before, context), planned.motion.q[0])
     if walk is None or report.failure is not None:
         report.planned = False
         return planned
@@ -105,29 +112,74 @@ def walk_before(context: RunContext, report: Report, planned: PlannedMotion) -> 
     return whole
 
 
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """A walk on a planned way, and that it meets nothing that stands there, or None where nothing does."""
+
+    plan: PlannedWalks
+    stepped: SteppedPath
+    walk: BalancedWalk
+    beside: Requirement | None
+
+    @property
+    def lack(self) -> float:
+        """How much nearer it comes to something than it may [m]."""
+        return 0.0 if self.beside is None else max(self.beside.limit - self.beside.measured, 0.0)
+
+
 def _walked(
-    context: RunContext, report: Report, plan: PlannedWalks, ends: Mapping[str, FloatArray] | None = None,
+    context: RunContext, report: Report,
+    find: Callable[[float], tuple[PlannedWalks, Mapping[str, FloatArray] | None]],
     last: FloatArray | None = None,
 ) -> BalancedWalk | None:  # fmt: skip
-    """The walk in balance on a planned way, reported; None where there is none.
+    """The walk in balance on a way, reported; None where there is none.
+
+    A walk that comes too near to something is tried again on ways with so much more room, as often as it may.
 
     Args:
-        ends: (3,) x, y [m], yaw [rad] where each foot stands at the end; beside the goal if omitted.
+        find: Gives the way, and (3,) x, y [m], yaw [rad] where each foot stands at the end, or None for
+            beside the goal, by the further room of the way [m].
         last: (nq,) posture in which it ends; standing if omitted.
     """
+    plan, ends = find(0.0)
     if not ways_found(report, plan):
         return None
+    best, further = _attempt(context, plan, ends, last), 0.0
+    lack = best.lack
+    for _ in range(AGAIN):
+        if lack <= 0.0:
+            break
+        further += lack + SPARE
+        plan, ends = find(further)
+        if not plan.route.succeeded:
+            break
+        tried = _attempt(context, plan, ends, last)
+        lack = tried.lack
+        best = tried if lack < best.lack else best
+    report.progress(STAGE, 0.6)
+    keep_paths(report, best.plan, best.stepped)
+    _report(context, report, best)
+    walk_others(context, report, best.plan)
+    return best.walk
+
+
+def _attempt(
+    context: RunContext, plan: PlannedWalks, ends: Mapping[str, FloatArray] | None, last: FloatArray | None
+) -> _Attempt:
+    """Walk on a way, and look what the body meets."""
     height, rule = context.scene.floor_height or 0.0, walking.StepRule().scaled(context.body.stature or 1.75)
     with context.scenario.refusing(("walking",)):
         others = Scene(in_the_way(context.scene, context.body.stature or 2.0), None)
         stepped = walking.step_along(plan.route, rule, ends=ends, height=height, obstacles=plan.obstacles)
         walk = balanced_walk(context.body, stepped, friction=FRICTION, end=last, scene=others)
-    report.progress(STAGE, 0.6)
-    keep_paths(report, plan, stepped)
-    block = path_block(plan, stepped)
-    beside = _clearance(walk, others)
+    return _Attempt(plan, stepped, walk, _clearance(walk, others))
+
+
+def _report(context: RunContext, report: Report, attempt: _Attempt) -> None:
+    """Tell what was measured of a walk, what it has to keep, and the first that it does not."""
+    walk, beside, block = attempt.walk, attempt.beside, path_block(attempt.plan, attempt.stepped)
     block["min_clearance_m"] = None if beside is None else beside.measured
-    report.finish(STAGE, block | _measures(walk, stepped.footprints))
+    report.finish(STAGE, block | _measures(walk, attempt.stepped.footprints))
     table = requirement_table([
         Requirement("missed_m", "distance of a foot from its place, out of reach", "m", walk.missed, "<=",
                     REACHED),
@@ -139,8 +191,6 @@ def _walked(
     report.require(STAGE, table)
     if (broken := table.first_broken) is not None:
         report.fail(STAGE, broken.reason, broken.time_s or 0.0, PLACES.get(broken.key, broken.where))
-    walk_others(context, report, plan)
-    return walk
 
 
 def _clearance(walk: BalancedWalk, scene: Scene) -> Requirement | None:

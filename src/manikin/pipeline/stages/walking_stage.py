@@ -66,7 +66,7 @@ def walked_schedule(walk: Walk, height: float) -> ContactSchedule:
     return schedule_of_support(walk.time, walk.support, lambda *touching: contacts[touching], cap)
 
 
-WHOLE = walking.Walker(depth=0.36, width=0.6)
+WHOLE = walking.Walker(depth=0.4, width=0.66)
 """Extent of a body that is executed: its trunk, swaying, with its arms drawn in, and its feet. Where it has
 no way, the extent of the shoulders alone is kept, and what the body meets is measured."""
 
@@ -152,8 +152,9 @@ def walk_others(context: RunContext, report: Report, plan: PlannedWalks) -> None
 
 
 def plan_walks(
-    context: RunContext, start: FloatArray | None = None, goal: FloatArray | None = None
-) -> PlannedWalks:
+    context: RunContext, start: FloatArray | None = None, goal: FloatArray | None = None, *,
+    further: float = 0.0,
+) -> PlannedWalks:  # fmt: skip
     """Find a route for every walker, each around those before.
 
     That of a body that is executed keeps room for the whole of it where it can, see :data:`WHOLE`.
@@ -161,6 +162,7 @@ def plan_walks(
     Args:
         start: (3,) x, y [m], heading [rad] of the body; that of the task if omitted.
         goal: The same at the end.
+        further: Room for the whole of a body that is executed, beyond that of the scenario [m].
 
     Raises:
         ScenarioError: If a route is impossible: no floor, a start in an obstacle, a useless waypoint.
@@ -173,13 +175,13 @@ def plan_walks(
 
     def route_of(
         key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, *goal: Waypoint,
-        walker: walking.Walker | None = None,
+        walker: walking.Walker | None = None, further: float = 0.0,
     ) -> WalkRoute:  # fmt: skip
         stops = [*(Waypoint(place_of(stop), stop.speed_m_s, stop.wait_s) for stop in who.via), *goal]
         with scenario.refusing(key):
             return walking.walking_route(
-                begin, stops, objective, obstacles=obstacles, walker=walker, room=section.room_m,
-                max_speed=who.max_speed_m_s, wait=who.wait_s,
+                begin, stops, objective, obstacles=obstacles, walker=walker,
+                room=section.room_m + further,                max_speed=who.max_speed_m_s, wait=who.wait_s,
             )  # fmt: skip
 
     for number, other in enumerate(section.others):
@@ -193,7 +195,7 @@ def plan_walks(
     route = None
     if section.whole_body == "balanced":
         with suppress(ScenarioError):  # an end leaves no room for it
-            route = route_of(("walking",), section, start, Waypoint(goal), walker=WHOLE)
+            route = route_of(("walking",), section, start, Waypoint(goal), walker=WHOLE, further=further)
     if route is None or not route.succeeded:
         route = route_of(("walking",), section, start, Waypoint(goal))
     return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began)
