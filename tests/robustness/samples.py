@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 import yaml
 
-from manikin.body import creature_from_urdf
+from manikin.body import creature_from_mjcf, creature_from_urdf
 from manikin.motion.file import MotionFile, read_motions, write_motions
 from manikin.recordings import read_recording
 from manikin.reports.formats.bvh import to_bvh
@@ -149,6 +149,17 @@ def _read_urdf(path: Path) -> list[Any]:
     return [body.mass / 1e4, body.standing_posture()]
 
 
+def _mjcf(folder: Path) -> Path:
+    (folder / "meshes").mkdir(exist_ok=True)
+    trimesh.creation.box((200.0, 100.0, 40.0)).export(folder / "meshes" / "sole.stl")
+    return _written("walker.xml", (TESTS / "body" / "data" / "walker.xml").read_text())(folder)
+
+
+def _read_mjcf(path: Path) -> list[Any]:
+    body = creature_from_mjcf(path, {side: {"tip": f"{side}_foot"} for side in ("left", "right")})
+    return [body.mass / 1e4, body.standing_posture()]
+
+
 def _contact_plan(folder: Path) -> Path:
     scenario = load_scenario("platform")
     feet = {"left_foot": {"position": [0.0, 0.1, 0.0]}, "right_foot": {"position": [0.0, -0.1, 0.0]}}
@@ -183,7 +194,9 @@ FORMATS = (
     Format("obj", _mesh("obj"), _read_mesh),
     Format("ply", _mesh("ply"), _read_mesh, text=False),
     Format("dae", _mesh("dae"), _read_mesh),
+    Format("glb", _mesh("glb"), _read_mesh, text=False),
     Format("urdf", _urdf, _read_urdf),
+    Format("mjcf", _mjcf, _read_mjcf),
 )  # fmt: skip
 
 DAMAGED = {"asf": "person.asf", "mot": "walk.mot"}

@@ -53,6 +53,43 @@ def test_a_creature_is_built_from_its_file(write):
     assert q[5] == pytest.approx(np.sqrt(0.5))
 
 
+WALKER = {
+    "mjcf": "walker.xml",
+    "limbs": {side: {"tip": f"{side}_foot", "contact": "sole"} for side in ("left", "right")},
+    "sole": {"length_m": 0.2, "width_m": 0.1},
+}
+
+
+@pytest.fixture
+def walker(tmp_path):
+    """A robot as MuJoCo has it, and its mesh."""
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box((200.0, 100.0, 40.0)).export(tmp_path / "meshes" / "sole.stl")
+    shutil.copy(Path(__file__).parents[1] / "body/data/walker.xml", tmp_path)
+    return WALKER
+
+
+def test_a_robot_of_mjcf_is_built_from_its_file(write, walker):
+    scenario = load_scenario(write({**walker, "joint_speed_deg_s": 360.0}))
+    body = scenario.build_body()
+    assert body.name == "walker"
+    assert scenario.mass == body.mass
+    assert [limb.kind for limb in body.limbs] == ["sole", "sole"]
+    assert body.hinges[0].velocity_limit == pytest.approx(2.0 * np.pi)
+
+
+@pytest.mark.parametrize("robot", ["urdf", "mjcf"])
+def test_a_robot_is_found_from_another_folder(write, walker, tmp_path, robot):
+    """In the scenario that a run keeps, and in one that is laid over it."""
+    first = load_scenario(write(DOG if robot == "urdf" else walker))
+    (tmp_path / "runs").mkdir()
+    kept, over = tmp_path / "runs" / "scenario.yaml", tmp_path / "runs" / "over.yaml"
+    kept.write_text(first.to_yaml())
+    over.write_text("extends: ../creature.yaml\nname: over\n")
+    for file in (kept, over):
+        assert load_scenario(file).build_body().mass == first.build_body().mass
+
+
 def test_an_insect_has_its_own_size(write):
     body = load_scenario(write({"model": "insect"})).build_body()
     assert body.name == "insect"
@@ -85,6 +122,8 @@ def test_one_contact_of_a_creature_from_the_command_line(write, capsys):
         ({"model": "human", "urdf": "dog.urdf"}, {}, "body.urdf does not apply to a human"),
         ({"urdf": "dog.urdf"}, {}, "body.limbs is missing; valid: urdf: FILE and limbs"),
         ({"model": "urdf"}, {}, "body.urdf is missing"),
+        ({"mjcf": "walker.xml"}, {}, "body.limbs is missing; valid: mjcf: FILE and limbs"),
+        ({**DOG, "joint_speed_deg_s": 90}, {}, "joint_speed_deg_s does not apply to a creature from URDF"),
         ({**DOG, "limbs": {"leg": {"top": "x"}}}, {}, "valid: tip, root, contact, position, normal"),
         ({**DOG, "limbs": {"leg": {"tip": "x", "contact": "claw"}}}, {}, "'point', 'sole' or 'grasp'"),
         (DOG, {"reference_stature_m": 1.75}, "does not apply to a creature from URDF"),

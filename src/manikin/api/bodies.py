@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from manikin.balance import BalanceReport, evaluate_balance
-from manikin.body import BodyModel, creature_from_urdf, insect, quadruped
+from manikin.body import BodyModel, creature_from_mjcf, creature_from_urdf, insect, quadruped
 from manikin.body.human import human
 from manikin.contact import Contact, FrictionModel, Stance
 from manikin.contact import grasp as contact_grasp
@@ -159,19 +159,22 @@ def stance(
 def creature(
     source: str | Path = "insect", limbs: Mapping[str, Any] | None = None, **options: Any
 ) -> BodyModel:
-    """Body that is no person: the built-in insect or quadruped, or a robot or animal from a URDF file.
+    """Body that is no person: the built-in insect or quadruped, or a robot or animal from a file.
 
     Args:
-        source: ``"insect"``, ``"quadruped"``, or the file; BodyError if it or a limb is not usable.
+        source: ``"insect"``, ``"quadruped"``, or a file, of MJCF if its name ends in ``.xml`` or ``.mjcf``,
+            else of URDF; BodyError if it or a limb is not usable.
         limbs: Limbs of the file's body by name, see :func:`manikin.body.creature_from_urdf`.
-        options: Of that function, :func:`manikin.body.insect` or :func:`manikin.body.quadruped`.
+        options: Of that function, :func:`manikin.body.creature_from_mjcf`, :func:`manikin.body.insect` or
+            :func:`manikin.body.quadruped`.
     """
     built_in = {"insect": insect, "quadruped": quadruped}
     if str(source) in built_in:
         return built_in[str(source)](**options)
     if limbs is None:
         raise InputError(f"creature {str(source)!r} has no limbs; valid: limbs={{name: {{'tip': link}}}}")
-    return creature_from_urdf(source, limbs, **options)
+    read = creature_from_mjcf if Path(source).suffix.lower() in (".xml", ".mjcf") else creature_from_urdf
+    return read(source, limbs, **options)
 
 
 def scene(source: str | Path | Sequence[Obstacle] = (), *, floor: float | None = 0.0) -> Scene:

@@ -16,12 +16,13 @@ from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
 from manikin.body.limbs import are_mirrored
+from manikin.body.mjcf import read_mjcf
 from manikin.body.model import BodyModel
 from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape
 from manikin.body.urdf import Urdf, UrdfJoint, read_urdf
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_normal, skew
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array, rotation_from_normal, skew
 
 _MOST_HINGES = 3
 
@@ -71,9 +72,48 @@ def creature_from_urdf(
     Raises:
         BodyError: If the file or a limb is not usable.
     """
-    robot = _without_empty_root(read_urdf(path), str(path))
-    tree = _SegmentTree(robot, str(path))
-    specs = {name: _spec(name, value, str(path)) for name, value in limbs.items()}
+    return _creature(read_urdf(path), str(path), limbs, standing, sole_length, sole_width)
+
+
+JOINT_SPEED = 10.0
+"""Velocity limit of joints whose description has none [rad/s]; those of legged robots have 10 to 30."""
+
+
+def creature_from_mjcf(
+    path: str | Path,
+    limbs: Mapping[str, LimbSpec | Mapping[str, Any]],
+    *,
+    standing: Mapping[str, float] | None = None,
+    sole_length: float | None = None,
+    sole_width: float | None = None,
+    joint_speed: float = JOINT_SPEED,
+) -> BodyModel:
+    """Make a body from the robot of an MJCF file, as :func:`creature_from_urdf` does from URDF.
+
+    Bodies are what links are there. The root floats whether or not it has a free joint. Balls, slides and
+    equalities are refused; see :func:`manikin.body.mjcf.read_mjcf` for what is left out.
+
+    Args:
+        limbs: Limbs by name; mappings have the keys of :class:`LimbSpec`.
+        standing: Joint angles of the standing posture [rad]; others are 0, or the nearer limit.
+        sole_length: Length of the soles [m], of limbs that touch with one.
+        sole_width: Width of the soles [m].
+        joint_speed: Velocity limit of all joints, of which MJCF has none [rad/s].
+
+    Raises:
+        BodyError: If the file or a limb is not usable.
+    """
+    speed = finite_number(joint_speed, "joint speed [rad/s]", above=0.0, error=BodyError)
+    return _creature(read_mjcf(path, speed), str(path), limbs, standing, sole_length, sole_width)
+
+
+def _creature(
+    description: Urdf, path: str, limbs: Mapping[str, LimbSpec | Mapping[str, Any]],
+    standing: Mapping[str, float] | None, sole_length: float | None, sole_width: float | None,
+) -> BodyModel:  # fmt: skip
+    robot = _without_empty_root(description, path)
+    tree = _SegmentTree(robot, path)
+    specs = {name: _spec(name, value, path) for name, value in limbs.items()}
     _check_soles(specs, sole_length, sole_width)
     effectors = {spec.tip: tree.effector(name, spec) for name, spec in specs.items()}
     if len(effectors) != len(specs):
@@ -163,8 +203,11 @@ class _SegmentTree:
         joint: UrdfJoint | None = self.robot.joints.get(name)
         if joint is None:
             return ()
-        axis, effort = _tidy(self.members[name].rotation @ joint.axis), joint.effort
-        return (Hinge(joint.name, axis, joint.lower, joint.upper, joint.velocity, -effort, effort),)
+        axis, torques = (
+            _tidy(self.members[name].rotation @ joint.axis),
+            (joint.torque_lower, joint.torque_upper),
+        )
+        return (Hinge(joint.name, axis, joint.lower, joint.upper, joint.velocity, *torques),)
 
     def _fold(self, hinges: dict[str, tuple[Hinge, ...]], parents: dict[str, str | None]) -> None:
         """Give the hinges of massless segments to their only child at the same place."""

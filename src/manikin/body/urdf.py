@@ -66,6 +66,11 @@ def _primitive(item: Element, where: str, folder: Path) -> UrdfShape:
     length = _number(item, "length", f"{where} {item.tag}")
     if item.tag == "capsule":
         return UrdfShape(ShapeKind.CAPSULE, np.array([radius, length]))
+    return rounded_cylinder(radius, length)
+
+
+def rounded_cylinder(radius: float, length: float) -> UrdfShape:
+    """The capsule of a cylinder's radius and length [m], or the box of one that is shorter than wide."""
     if length > 2.0 * radius:
         return UrdfShape(ShapeKind.CAPSULE, np.array([radius, length - 2.0 * radius]))
     return UrdfShape(ShapeKind.BOX, np.array([2.0 * radius, 2.0 * radius, length]))
@@ -98,7 +103,7 @@ def _around_file(file: Path, stamp: int, scale: tuple[float, ...]) -> UrdfShape:
         raise BodyError(f"mesh '{file}' cannot be read ({reason}); valid: a mesh") from None
     if len(points) < 4 or not np.all(np.isfinite(points)):
         raise BodyError(f"mesh '{file}' has {len(points)} vertices; valid: at least 4 finite ones")
-    return _around(points * np.array(scale))
+    return shape_around(points * np.array(scale))
 
 
 def _mesh_file(name: str, folder: Path) -> Path | None:
@@ -112,8 +117,8 @@ def _mesh_file(name: str, folder: Path) -> Path | None:
     return next((file for file in tried if file.is_file()), None)
 
 
-def _around(points: FloatArray) -> UrdfShape:
-    """Smallest of the box, capsule and sphere around points."""
+def shape_around(points: FloatArray) -> UrdfShape:
+    """Smallest of the box, capsule and sphere around points (n, 3)."""
     try:
         to_box, extents = trimesh.bounds.oriented_bounds(points)
     except Exception:  # flat or straight: its hull has no volume
@@ -204,7 +209,7 @@ class UrdfJoint:
     """A joint of one of :data:`JOINT_KINDS`; its frame is that of the child link.
 
     Rotation (3, 3) and translation (3,) [m] take the child's frame to the parent's at angle 0; the unit axis
-    (3,) is in the child's frame. Angles in rad, the largest torque (effort) in N.m and speed in rad/s.
+    (3,) is in the child's frame. Angles in rad, torques in N.m, speed in rad/s.
     """
 
     name: str
@@ -216,7 +221,8 @@ class UrdfJoint:
     axis: FloatArray
     lower: float
     upper: float
-    effort: float
+    torque_lower: float
+    torque_upper: float
     velocity: float
 
 
@@ -243,7 +249,7 @@ def read_urdf(path: str | Path) -> Urdf:
         BodyError: If the file is missing, no URDF, no tree, or has what is not understood.
     """
     file = Path(path)
-    root = _parsed(file)
+    root = parsed_file(file, "robot", "a URDF file")
     where = str(file)
     links = [_link(element, file) for element in root.findall("link")]
     joints = [_joint(element, where) for element in root.findall("joint")]
@@ -251,26 +257,27 @@ def read_urdf(path: str | Path) -> Urdf:
         raise BodyError(f"{where}: no link; valid: at least one")
     if len(links) > MAX_LINKS:
         raise BodyError(f"{where}: {len(links)} links; valid: at most {MAX_LINKS}")
-    _check_unique([link.name for link in links], "link", where)
-    _check_unique([joint.name for joint in joints], "joint", where)
+    check_unique([link.name for link in links], "link", where)
+    check_unique([joint.name for joint in joints], "joint", where)
     by_name = {link.name: link for link in links}
     ordered = {name: by_name[name] for name in _order(links, joints, where)}
     return Urdf(root.get("name") or file.stem, ordered, {joint.child: joint for joint in joints})
 
 
-def _parsed(file: Path) -> Element:
+def parsed_file(file: Path, tag: str, kind: str) -> Element:
+    """Root of an XML file, which has to be a ``<tag>``; messages ask for what ``kind`` says."""
     try:
         if file.exists() and not file.is_file():
-            raise BodyError(f"{file}: is no regular file; valid: a URDF file")
+            raise BodyError(f"{file}: is no regular file; valid: {kind}")
         if (size := file.stat().st_size) > MAX_BYTES:
             raise BodyError(f"{file}: has {size} bytes; valid: at most {MAX_BYTES}")
         root = ElementTree.fromstring(file.read_bytes())
     except OSError as error:
-        raise BodyError(f"{file}: {error.strerror or error}; valid: a URDF file") from None
+        raise BodyError(f"{file}: {error.strerror or error}; valid: {kind}") from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise BodyError(f"{file}: is no XML ({error}); valid: a URDF file") from None
-    if root.tag != "robot":
-        raise BodyError(f"{file}: begins with <{root.tag[:40]}>; valid: <robot>")
+        raise BodyError(f"{file}: is no XML ({error}); valid: {kind}") from None
+    if root.tag != tag:
+        raise BodyError(f"{file}: begins with <{root.tag[:40]}>; valid: <{tag}>")
     return root
 
 
@@ -316,10 +323,10 @@ def _joint(element: Element, where: str) -> UrdfJoint:
     return UrdfJoint(name, kind, parent, child, rotation, translation, axis / max(length, 1e-9), *limits)
 
 
-def _limits(element: Element, kind: str, place: str) -> tuple[float, float, float, float]:
-    """Lower, upper, effort, velocity."""
+def _limits(element: Element, kind: str, place: str) -> tuple[float, float, float, float, float]:
+    """Lower, upper, least and largest torque, velocity."""
     if kind not in ("revolute", "continuous"):
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     limit = _child(element, "limit", place)
     place = f"{place} limit"
     effort, velocity = (_number(limit, key, place) for key in ("effort", "velocity"))
@@ -331,7 +338,7 @@ def _limits(element: Element, kind: str, place: str) -> tuple[float, float, floa
             f"{place} has lower {lower:g}, upper {upper:g}, effort {effort:g}, velocity {velocity:g}; "
             "valid: lower < upper, effort > 0, velocity > 0"
         )
-    return lower, upper, effort, velocity
+    return lower, upper, -effort, effort, velocity
 
 
 def _order(links: list[UrdfLink], joints: list[UrdfJoint], where: str) -> list[str]:
@@ -341,7 +348,7 @@ def _order(links: list[UrdfLink], joints: list[UrdfJoint], where: str) -> list[s
         for link in (joint.parent, joint.child):
             if link not in names:
                 raise BodyError(f"{where}: joint {joint.name!r} has link {link!r}; valid: one of {names}")
-    _check_unique([joint.child for joint in joints], "child link", where)
+    check_unique([joint.child for joint in joints], "child link", where)
     roots = [name for name in names if name not in {joint.child for joint in joints}]
     if len(roots) != 1:
         raise BodyError(f"{where}: links without parent are {roots}; valid: exactly one, the root")
@@ -355,7 +362,8 @@ def _order(links: list[UrdfLink], joints: list[UrdfJoint], where: str) -> list[s
     return order
 
 
-def _check_unique(names: list[str], kind: str, where: str) -> None:
+def check_unique(names: list[str], kind: str, where: str) -> None:
+    """Refuse names that occur twice."""
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise BodyError(f"{where}: {kind} {twice[0]!r} occurs twice; valid: once")

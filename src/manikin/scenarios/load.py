@@ -45,20 +45,23 @@ def read_extended(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     if variant is not None:
         base = apply_variant(base, variant, str(base_path))
     if base_path.resolve().parent != path.resolve().parent:
-        base = Tree(_with_absolute_meshes(base.data, base_path.resolve().parent), base.lines)
+        base = Tree(_with_absolute_files(base.data, base_path.resolve().parent), base.lines)
     return merge(base, tree.without(EXTENDS))
 
 
-def _with_absolute_meshes(data: Any, folder: Path) -> Any:
+def _with_absolute_files(data: Any, folder: Path) -> Any:
     if not isinstance(data, Mapping):
         return data
     changed = dict(data)
     if isinstance(data.get("mesh"), str):
         changed["mesh"] = mesh_place(data["mesh"], folder)
+    if isinstance(body := data.get("body"), Mapping):
+        files = {key: body[key] for key in ("urdf", "mjcf") if isinstance(body.get(key), str)}
+        changed["body"] = {**body, **{key: str((folder / name).resolve()) for key, name in files.items()}}
     if isinstance(data.get("scene"), list):
-        changed["scene"] = [_with_absolute_meshes(entry, folder) for entry in data["scene"]]
+        changed["scene"] = [_with_absolute_files(entry, folder) for entry in data["scene"]]
     if isinstance(data.get(VARIANTS), Mapping):
-        changed[VARIANTS] = {k: _with_absolute_meshes(v, folder) for k, v in data[VARIANTS].items()}
+        changed[VARIANTS] = {k: _with_absolute_files(v, folder) for k, v in data[VARIANTS].items()}
     return changed
 
 

@@ -184,12 +184,14 @@ class Scenario(Displayed, ScenarioValues):
     def to_yaml(self) -> str:
         """Return the scenario with every default and override written out, ready to run again.
 
-        Paths of meshes and recordings become absolute, so that the file can be kept elsewhere.
+        Paths of meshes, robots and recordings become absolute, so that the file can be kept elsewhere.
         """
         data = self._data()
         for obstacle in data["scene"]:
             if "mesh" in obstacle:
                 obstacle["mesh"] = mesh_place(obstacle["mesh"], self.folder)
+        for key in {"urdf", "mjcf"} & set(data["body"]):
+            data["body"][key] = str((self.folder / data["body"][key]).resolve())
         if "recording" in data["planning"]:
             data["planning"]["recording"] = str(self.find_file(data["planning"]["recording"]).resolve())
         return _yaml(data)

@@ -53,7 +53,7 @@ class ScenarioValues:
     @property
     def mass(self) -> float:
         """Body mass, without a load [kg]."""
-        if self.file.body.model in ("urdf", "kudoh"):
+        if self.file.body.model in ("urdf", "mjcf", "kudoh"):
             return build_body(self).own_mass
         return self.file.body.mass_kg
 
@@ -278,7 +278,7 @@ def _same_human(
 def build_body(values: ScenarioValues) -> BodyModel:
     """Build the body, its soles of the size that the supports give; ScenarioError if it is out of range."""
     data, sole = values.file.body, values.sole
-    if data.model in ("insect", "quadruped", "urdf"):
+    if data.model in ("insect", "quadruped", "urdf", "mjcf"):
         return _creature(values)
     load = data.load if data.load is not None and data.load.lasts else None
     if data.model == "kudoh":
@@ -302,14 +302,18 @@ def _creature(values: ScenarioValues) -> BodyModel:
     """An insect, a quadruped, or the creature of a robot description."""
     data = values.file.body
     with values.refusing(("body",)):
-        if data.model != "urdf":
+        if data.model in ("insect", "quadruped"):
             make = bodies.insect if data.model == "insect" else bodies.quadruped
             return make(data.length_m, data.mass_kg)
         sole = data.sole
-        return bodies.creature_from_urdf(
-            values.folder / str(data.urdf),
-            {name: limb.model_dump() for name, limb in (data.limbs or {}).items()},
-            standing={name: float(np.deg2rad(angle)) for name, angle in (data.standing_deg or {}).items()},
-            sole_length=None if sole is None else sole.length_m,
-            sole_width=None if sole is None else sole.width_m,
-        )
+        options: dict[str, Any] = {
+            "standing": {name: float(np.deg2rad(angle)) for name, angle in (data.standing_deg or {}).items()},
+            "sole_length": None if sole is None else sole.length_m,
+            "sole_width": None if sole is None else sole.width_m,
+        }
+        limbs = {name: limb.model_dump() for name, limb in (data.limbs or {}).items()}
+        if data.model == "urdf":
+            return bodies.creature_from_urdf(values.folder / str(data.urdf), limbs, **options)
+        if data.joint_speed_deg_s is not None:
+            options["joint_speed"] = float(np.deg2rad(data.joint_speed_deg_s))
+        return bodies.creature_from_mjcf(values.folder / str(data.mjcf), limbs, **options)

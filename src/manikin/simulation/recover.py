@@ -2,12 +2,10 @@
 
 import math
 import time as clock
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,6 +16,7 @@ from manikin.control.recovery import BalanceRecovery, FeltPush, RecoverySettings
 from manikin.control.stepping import SteppingRecovery, StepSettings
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.runtime.quiet_engine import quiet_engine
 from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
 from manikin.simulation.execute import JOINT_DAMPING, body_physics
@@ -92,19 +91,8 @@ def recover(
         BodyError: If it does not stand on two legs.
     """
     run = _RecoveryRun(body, task, settings or RecoverySettings(), scene)
-    with _quiet_engine():
+    with quiet_engine():
         return run.run(progress)
-
-
-@contextmanager
-def _quiet_engine() -> Iterator[None]:
-    """Context in which a simulation that diverges leaves no ``MUJOCO_LOG.TXT`` in the working directory."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 class _RecoveryRun:

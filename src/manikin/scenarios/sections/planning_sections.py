@@ -140,14 +140,19 @@ _KEYS = {
     "insect": ("length_m", "mass_kg"),
     "quadruped": ("length_m", "mass_kg"),
     "urdf": ("urdf", "limbs", "standing_deg", "sole"),
+    "mjcf": ("mjcf", "limbs", "standing_deg", "sole", "joint_speed_deg_s"),
 }
 """What each kind of body may be given."""
 
 WORDS = {
     "human": "a human", "point_mass": "a point mass", "kudoh": "the body of Kudoh, who has his own size",
     "insect": "an insect", "quadruped": "a quadruped", "urdf": "a creature from URDF",
+    "mjcf": "a creature from MJCF",
 }  # fmt: skip
 """Kinds of bodies in words."""
+
+_FILES = ("urdf", "mjcf")
+"""Kinds of bodies that come from a file, which is named by the key of the same name."""
 
 _OWN_SIZES = {"insect": {"mass_kg": 2.0}, "quadruped": {"length_m": 0.8, "mass_kg": 32.0}}
 """Sizes of creatures where the file gives none."""
@@ -187,11 +192,11 @@ class LoadSection(Section):
 class BodySection(Section):
     """Whose motion it is."""
 
-    model: Literal["human", "kudoh", "point_mass", "insect", "quadruped", "urdf"] = preset(
+    model: Literal["human", "kudoh", "point_mass", "insect", "quadruped", "urdf", "mjcf"] = preset(
         "human",
         "built-in body: a person; kudoh, the 15 segments of Kudoh (2002), 1.72 m and 70 kg; "
-        "a point mass on massless feet, planned but not executed; an insect; a quadruped; or urdf, which "
-        "goes without saying beside that key, for a creature from a file",
+        "a point mass on massless feet, planned but not executed; an insect; a quadruped; or urdf or mjcf, "
+        "which goes without saying beside that key, for a creature from a file",
     )
     stature_m: Positive = preset(1.75, "standing height [m], of a human only")
     mass_kg: Positive = preset(
@@ -222,6 +227,10 @@ class BodySection(Section):
         0.4, "length of the trunk [m], of an insect or a quadruped only (default of a quadruped: 0.8)"
     )
     urdf: Text | None = optional("robot description of a creature, relative to this file's folder")
+    mjcf: Text | None = optional("the same as MuJoCo has it")
+    joint_speed_deg_s: Positive | None = optional(
+        "velocity limit of all joints of a creature from MJCF, which has none [deg/s] (default: 573)"
+    )
     limbs: dict[str, LimbSection] | None = optional("limbs of a creature, by name")
     standing_deg: dict[str, Number] | None = optional("joint angles of a creature's standing posture [deg]")
     sole: SoleSection | None = optional("size of a creature's soles")
@@ -232,8 +241,9 @@ class BodySection(Section):
         """A file of a creature says which model it is; creatures do not weigh what a person does."""
         if not isinstance(data, Mapping):
             return data
-        if "urdf" in data and "model" not in data:
-            return {**data, "model": "urdf"}
+        for kind in _FILES:
+            if kind in data and "model" not in data:
+                return {**data, "model": kind}
         return {**_OWN_SIZES.get(str(data.get("model")), {}), **data}
 
     @model_validator(mode="after")
@@ -243,8 +253,8 @@ class BodySection(Section):
             if key not in valid and getattr(self, key) is not None:
                 keys = ", ".join(("model", *valid))
                 raise refuse(key, f"does not apply to {WORDS[self.model]}; valid: {keys}")
-        for key in ("urdf", "limbs") if self.model == "urdf" else ():
-            problem = "is missing; valid: urdf: FILE and limbs: {NAME: {tip: LINK}}"
+        for key in (self.model, "limbs") if self.model in _FILES else ():
+            problem = f"is missing; valid: {self.model}: FILE and limbs: {{NAME: {{tip: LINK}}}}"
             refuse_if(not getattr(self, key), key, problem)
         return self
 
