@@ -68,15 +68,15 @@ def walked(seed: int, number: int, *, plan: bool, folder: Path | None) -> tuple[
     except ManikinError as error:
         return False, f"{name}: refused: {error}"
     spent, summary = time.process_time() - began, result.summary
-    walk, execution, failure = summary["walk"], summary.get("execution") or {}, summary["failure"]
+    walk, failure = summary["walk"], summary["failure"]
     parts = [f"{name}: {len(data['scene'])} boxes, {spent:.0f} s"]
     if "motion_s" in walk:
         parts.append(f"{walk['path_length_m']:.2f} m in {walk['motion_s']:.1f} s")
         parts.append(f"clearance {1e3 * walk['min_clearance_m']:.0f} mm")
-    if result.executed is not None:
-        parts.append(f"margin {100.0 * float(np.mean(result.executed.margin > 0.0)):.1f} %")
+    if (execution := result.execution) is not None:
+        parts.append(f"margin {100.0 * float(np.mean(execution.motion.margin > 0.0)):.1f} %")
         measures = {"slide": "max_slip_m", "deep": "max_penetration_m", "off": "max_foot_error_m"}
-        parts += [f"{word} {1e3 * execution[key]:.1f} mm" for word, key in measures.items()]
+        parts += [f"{word} {1e3 * getattr(execution, key):.1f} mm" for word, key in measures.items()]
     if failure is not None:
         where = f"{failure['where']}, {failure['time_s'] or 0.0:.2f} s"
         parts.append(f"{failure['stage']}: {failure['reason']} ({where})")

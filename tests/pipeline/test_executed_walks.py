@@ -41,8 +41,8 @@ def test_the_walk_to_the_platform_ends_in_the_first_posture_of_its_plan(runs):
 
 
 def test_a_walk_that_would_meet_a_wall_says_what_and_when():
-    """Between walls 0.52 m apart shoulders fit, arms do not; nothing is executed."""
-    wall = "{{name: {}, box: [1, 0.1, 2], position: [1, {}, 1]}}"
+    """Between long walls 0.52 m apart shoulders fit, arms do not; nothing is executed."""
+    wall = "{{name: {}, box: [9, 0.1, 2], position: [1, {}, 1]}}"
     walls = f"[{wall.format('left', 0.31)}, {wall.format('right', -0.31)}]"
     changed = [f"scene={walls}", "walking.room_m=0.0", "task.goal={at: [2, 0], heading_deg: 0}"]
     result = run("stroll", overrides=changed)

@@ -20,9 +20,8 @@ DRAWN_IN = {
     "shoulder_flexion": -0.05, "shoulder_abduction": 0.14, "shoulder_rotation": -0.1, "elbow_flexion": 0.08,
     "forearm_pronation": 0.0, "wrist_flexion": 0.0, "wrist_radial_deviation": 0.0,
 }  # fmt: skip
-"""Angles of arms that hang beside the body [rad]: they leave 15 mm to the trunk and the thighs of a walk. Those
-of a person of 1.75 m reach 0.31 m to the side and 0.1 m ahead of the pelvis, less than the trunk; arms that
-swing reach 0.44 and 0.33 m."""
+"""Angles of arms that hang beside the body [rad]: they leave 15 mm to the trunk and the thighs of a walk, and
+reach 0.31 m to the side and 0.1 m ahead of the pelvis in a person of 1.75 m; when they swing, 0.44 and 0.33 m."""
 
 _EVERY = 2
 _SIDES = ("left", "right")
