@@ -20,8 +20,9 @@ DRAWN_IN = {
     "shoulder_flexion": -0.05, "shoulder_abduction": 0.14, "shoulder_rotation": -0.1, "elbow_flexion": 0.08,
     "forearm_pronation": 0.0, "wrist_flexion": 0.0, "wrist_radial_deviation": 0.0,
 }  # fmt: skip
-"""Angles of arms that hang beside the body [rad]: they leave 15 mm to the trunk and the thighs of a walk, and
-reach 0.31 m to the side and 0.1 m ahead of the pelvis in a person of 1.75 m; when they swing, 0.44 and 0.33 m."""
+"""Angles of arms that hang beside the body [rad]. They leave 15 mm to the trunk and the thighs of a walk.
+In a person of 1.75 m they reach 0.31 m to the side and 0.1 m ahead of the pelvis, and 0.44 and 0.33 m as they
+swing."""
 
 _EVERY = 2
 _SIDES = ("left", "right")
