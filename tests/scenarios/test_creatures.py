@@ -154,3 +154,22 @@ def test_what_the_file_lacks_is_said_with_its_place(write, change, match):
         scenario.build_body()
     assert "creature.yaml" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("body", "posture", "limbs", "method"),
+    [
+        ({"model": "human"}, "standing", None, "follow"),
+        ({"model": "human"}, "climbing", ("left_arm", "right_arm", "left_leg", "right_leg"), "refine"),
+        ({"model": "quadruped"}, "standing", (), "refine"),
+    ],
+)
+def test_limbs_and_method_go_without_saying(body, posture, limbs, method, tmp_path):
+    """A file with a start and a goal alone is no less clear for a creature or on a ladder than on feet."""
+    task = {"start": {"at": [0.0, 0.0]}, "goal": {"at": [1.0, 0.0], "posture": posture}}
+    file = tmp_path / "there.yaml"
+    file.write_text(yaml.safe_dump({"name": "there", "body": body, "task": task}))
+    scenario = load_scenario(file)
+    assert scenario.contact_limbs == limbs
+    assert scenario.file.wholebody.method == method
+    assert not load_scenario(file, overrides=["wholebody.method=follow"]).refines

@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from manikin.scenarios.sections.operation_sections import TaskSection, refused_operations
 from manikin.scenarios.sections.planning_sections import (
+    CLIMBING_LIMBS,
     WORDS,
     BodySection,
     ComConstraintSection,
@@ -125,9 +126,15 @@ class ScenarioFile(Section):
     @model_validator(mode="before")
     @classmethod
     def _implied(cls, data: Any) -> Any:
-        """A body that recovers from a push ends where it starts; what cannot be executed is only planned."""
+        """What goes without saying: keys that others leave no choice about.
+
+        A body that recovers from a push ends where it starts; what cannot be executed is only planned; who
+        climbs does so on hands and feet; a motion on contacts of any limbs is refined.
+        """
         if not isinstance(data, dict):
             return data
+        if _is_planned(data):
+            data = _on_limbs(data)
         if data.get("recovery") is not None and "task" not in data:
             data = {**data, "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
         return {**data, "execution": "none"} if "execution" not in data and _only_planned(data) else data
@@ -289,13 +296,9 @@ class ScenarioFile(Section):
         """Refuse what contacts cannot be planned for."""
         point_mass = self.body.model == "point_mass"
         refuse_if(point_mass, "supports", "is missing; valid: explicit supports for a point mass")
-        holds = self.contacts is not None and self.contacts.limbs is not None
         for end in ("start", "goal"):
             problem = "has no meaning without explicit supports; valid: at, heading_deg, height_m, posture"
             self._refuse_given(("com", "velocity_m_s"), problem, f"task.{end}.")
-            climbs = getattr(self.task, end).posture == "climbing"
-            problem = "is climbing; valid: beside contacts.limbs, the limbs that hold on"
-            refuse_if(climbs and not holds, f"task.{end}.posture", problem)
         seated = self.task.goal.posture == "seated" and self.wholebody.method == "refine"
         problem = "is seated; valid: standing or crouched for a refined motion"
         refuse_if(seated, "task.goal.posture", problem)
@@ -314,6 +317,32 @@ class ScenarioFile(Section):
                 raise self._inapplicable(key)
         if self.body.model != "point_mass" and self.supports is not None:
             raise refuse("supports", f"do not apply to {WORDS[self.body.model]} yet; valid: leave them out")
+
+
+def _is_planned(data: dict[str, Any]) -> bool:
+    """Whether an unchecked file leaves its contacts to be planned."""
+    return not any(data.get(key) is not None for key in ("supports", "recovery", "walking"))
+
+
+def _on_limbs(data: dict[str, Any]) -> dict[str, Any]:
+    """An unchecked file with the limbs of one who climbs, and the method of contacts of any limbs."""
+    body, contacts, task, wholebody = (
+        _mapping(data, key) for key in ("body", "contacts", "task", "wholebody")
+    )
+    human = "urdf" not in body and body.get("model", "human") == "human"
+    if human and any(_mapping(task, end).get("posture") == "climbing" for end in ("start", "goal")):
+        contacts = {"limbs": list(CLIMBING_LIMBS), **contacts}
+        data = {**data, "contacts": contacts}
+    on_feet = human and contacts.get("limbs") is None
+    if on_feet or body.get("model") == "point_mass" or "method" in wholebody:
+        return data
+    return {**data, "wholebody": {**wholebody, "method": "refine"}}
+
+
+def _mapping(data: dict[str, Any], key: str) -> dict[str, Any]:
+    """A section of an unchecked file; empty where it is missing or none."""
+    section = data.get(key)
+    return section if isinstance(section, dict) else {}
 
 
 def _only_planned(data: dict[str, Any]) -> bool:

@@ -45,9 +45,6 @@ def sitting(sketch: Sketch) -> None:
     sketch.exchange()
 
 
-LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
-
-
 def ladders(sketch: Sketch) -> None:
     """Climb a ladder that leans on a wall, up to its second to fourth rung, or down from there.
 
@@ -73,7 +70,6 @@ def ladders(sketch: Sketch) -> None:
     level = round(reached * apart, 3)
     # The root of who stands on a rung is 0.4 m before the ladder there.
     sketch.goal(away + (level + 0.9) * slope - 0.4, 0.0, height_m=level, posture="climbing")
-    sketch.keys |= {"contacts": {"limbs": list(LIMBS)}, "wholebody": {"method": "refine"}}
     if sketch.coin():
         sketch.exchange()
 
@@ -147,4 +143,3 @@ def _as_quadruped(sketch: Sketch) -> None:
     sketch.body = {
         "model": "quadruped", "length_m": length, "mass_kg": round(sketch.between(55.0, 70.0) * length**3, 1),
     }  # fmt: skip
-    sketch.keys |= {"wholebody": {"method": "refine"}}

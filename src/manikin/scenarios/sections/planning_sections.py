@@ -71,6 +71,10 @@ class ComConstraintSection(OneOf):
     )
 
 
+CLIMBING_LIMBS = ("left_arm", "right_arm", "left_leg", "right_leg")
+"""Limbs of a human that climbs, where none are named."""
+
+
 class ContactsSection(Section):
     """How contacts are planned where no supports are given."""
 
@@ -79,7 +83,8 @@ class ContactsSection(Section):
     stride_m: Positive = preset(0.4, "length of a step [m] of a body of 1.75 m, scaled to the actual one")
     limbs: list[Text] | None = optional(
         "names of the limbs that make contacts, hands as grasps (default: a human's feet, in "
-        "steps on surfaces that carry the whole sole; all limbs of other bodies)"
+        "steps on surfaces that carry the whole sole, and hands as well where it climbs; all limbs "
+        "of other bodies)"
     )
     grasp_force_N: Positive = preset(400.0, "largest force of a grasp along each axis [N]")
     forefoot_m: Positive | None = optional(
@@ -106,7 +111,8 @@ class WholebodySection(Section):
     method: Literal["follow", "refine"] = preset(
         "follow",
         "follow: contacts, swings and a planned centre of mass; refine: smooth the postures at "
-        "the changes of contact into a motion that keeps to physics, with no centre of mass prescribed",
+        "the changes of contact into a motion that keeps to physics, with no centre of mass prescribed; "
+        "it goes without saying where contacts of any limbs are planned",
     )
     pace: Positive = preset(
         1.0,
