@@ -51,7 +51,9 @@ def declared(*extras):
     return {re.match(r"[\w-]+", line)[0].lower() for line in lines}
 
 
-@pytest.mark.parametrize(("folder", "extras"), [("src", ("mocap",)), ("tests", ("test", "mocap", "video"))])
+@pytest.mark.parametrize(
+    ("folder", "extras"), [("src", ("mocap",)), ("tests", ("test", "mocap", "video", "usd"))]
+)
 def test_every_import_is_declared(folder, extras):
     scripts = {path.stem.replace("_", "-") for path in (ROOT / "docs").glob("*.py")}
     known = {*declared(*extras), *scripts, "manikin", "tests"}

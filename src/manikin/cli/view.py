@@ -114,14 +114,14 @@ def export(
     context: typer.Context,
     source: MotionArgument,
     format: Annotated[
-        Literal["bvh", "c3d", "csv", "gif", "glb", "mjcf", "mp4", "osim", "trc", "urdf"],
-        option("bvh|c3d|csv|gif|glb|mjcf|mp4|osim|trc|urdf", "File format.", "--format"),
+        Literal["bvh", "c3d", "csv", "gif", "glb", "mjcf", "mp4", "osim", "trc", "urdf", "usd"],
+        option("bvh|c3d|csv|gif|glb|mjcf|mp4|osim|trc|urdf|usd", "File format.", "--format"),
     ],
     out: Annotated[Path | None, option("FILE", "Default: beside the motion.")] = None,
     motion: Annotated[str | None, option("planned|executed", "Default: executed if there is one.")] = None,
     rate: Annotated[
         float | None,
-        option("HZ", "Samples per second; default: 100, but 60 glb, 25 mp4, 12.5 gif, all csv."),
+        option("HZ", "Samples per second; default: 100, but 60 glb and usd, 25 mp4, 12.5 gif, all csv."),
     ] = None,
     size: Annotated[str | None, option("WxH", "Pixels of mp4 and gif; default: 640x480.")] = None,
     names: Annotated[

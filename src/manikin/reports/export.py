@@ -29,6 +29,7 @@ from manikin.reports.formats.bvh import scene_obj, to_bvh
 from manikin.reports.formats.opensim import coordinates_mot, external_loads, to_osim
 from manikin.reports.formats.recorded import loads_mot, to_c3d, to_trc
 from manikin.reports.formats.robots import scene_urdf, to_mjcf, to_urdf
+from manikin.reports.formats.usd import to_usd
 from manikin.reports.formats.video import SIZE, Film, to_gif, to_mp4
 from manikin.reports.gltf import to_glb
 from manikin.runtime.display import readable
@@ -214,6 +215,7 @@ _FORMATS: Mapping[str, _Format] = {
     "bvh": _Format(_write_bvh, 100.0),
     "csv": _Format(lambda e: write_result(e.path, to_csv(e.motion)), None, needs_body=False),
     "glb": _Format(lambda e: write_content(e.path, to_glb(e.body, e.motion, e.content.scene)), 60.0),
+    "usd": _Format(lambda e: write_content(e.path, to_usd(e.body, e.motion, e.rate, e.content.scene)), 60.0),
     "mp4": _Format(lambda e: write_content(e.path, to_mp4(e.film, e.rate, e.options.progress)), 25.0),
     "gif": _Format(lambda e: write_content(e.path, to_gif(e.film, e.rate, e.options.progress)), 12.5),
     "mjcf": _Format(

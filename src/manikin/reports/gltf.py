@@ -6,6 +6,7 @@ joints of one skin, each with a rotation per sample; the root also has its place
 """
 
 import json
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -25,12 +26,12 @@ TO_GLTF: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0
 """Rotation of our world's axes to those of glTF: X = y (left), Y = z (up), Z = x (forward)."""
 TO_GLTF.setflags(write=False)
 
-_COLOURS: dict[str, tuple[float, float, float, float]] = {
+LINEAR_COLOURS: dict[str, tuple[float, float, float, float]] = {
     Material.SKIN: (0.72, 0.46, 0.33, 1.0), Material.HAIR: (0.06, 0.035, 0.02, 1.0),
     Material.SHIRT: (0.06, 0.19, 0.45, 1.0), Material.TROUSERS: (0.05, 0.06, 0.09, 1.0),
     Material.SHOES: (0.02, 0.02, 0.02, 1.0), "shapes": (0.35, 0.38, 0.42, 1.0), "scene": (0.6, 0.6, 0.6, 1.0),
 }  # fmt: skip
-"""Base colours, linear red, green, blue and opacity."""
+"""Base colours of materials, bodies of shapes and obstacles: linear red, green, blue and opacity."""
 _FLOAT, _SHORT, _INDEX = (5126, "<f4"), (5123, "<u2"), (5125, "<u4")
 _VERTICES, _TRIANGLES = 34962, 34963
 
@@ -65,23 +66,21 @@ def to_glb(body: BodyModel, motion: Motion, scene: Scene | None = None) -> bytes
     Raises:
         MotionFileError: If the motion is not the body's, or the body has nothing to draw.
     """
-    if motion.joint_names != body.joint_names:
-        raise MotionFileError("motion has other joints than the body; valid: the body's own motion")
-    skin = surface_of(body)
+    skin = moved_surface(body, motion)
     buffer, meshes = _Buffer(), list[dict[str, Any]]()
     materials = [
         {"name": str(name), "doubleSided": True,
          "pbrMetallicRoughness": {"baseColorFactor": list(colour), "metallicFactor": 0.0,
                                   "roughnessFactor": 0.9}}
-        for name, colour in _COLOURS.items()
+        for name, colour in LINEAR_COLOURS.items()
     ]  # fmt: skip
-    numbers = {name: number for number, name in enumerate(_COLOURS)}
+    numbers = {name: number for number, name in enumerate(LINEAR_COLOURS)}
     names = skin.segments
     nodes: list[dict[str, Any]] = [{"name": name} for name in names]
     for segment in body.segments:
         if segment.parent is not None:
             nodes[names.index(segment.parent)].setdefault("children", []).append(names.index(segment.name))
-    meshes.append({"name": body.name, "primitives": _skinned(skin, buffer, numbers, body)})
+    meshes.append({"name": body.name, "primitives": _skinned(skin, buffer, numbers)})
     matrices = np.tile(np.eye(4), (len(names), 1, 1))
     matrices[:, :3, :3] = skin.rotations.transpose(0, 2, 1)
     matrices[:, :3, 3] = -np.einsum("sji,sj->si", skin.rotations, skin.origins)
@@ -112,6 +111,20 @@ def to_glb(body: BodyModel, motion: Motion, scene: Scene | None = None) -> bytes
         "accessors": buffer.accessors,
     }  # fmt: skip
     return _packed(document, bytes(buffer.data))
+
+
+def moved_surface(body: BodyModel, motion: Motion) -> Skin:
+    """Surface of a body whose motion this is, with the body's segments as bones.
+
+    Raises:
+        MotionFileError: If the motion is not the body's, or the body has nothing to draw.
+    """
+    if motion.joint_names != body.joint_names:
+        raise MotionFileError("motion has other joints than the body; valid: the body's own motion")
+    skin = surface_of(body)
+    if [segment.name for segment in body.segments] != list(skin.segments):
+        raise MotionFileError(f"body {body.name!r} has other segments than its surface; valid: the same ones")
+    return skin
 
 
 def surface_of(body: BodyModel) -> Skin:
@@ -146,10 +159,8 @@ def _shapes(body: BodyModel) -> Skin:
     )  # fmt: skip
 
 
-def _skinned(skin: Skin, buffer: _Buffer, numbers: dict[str, int], body: BodyModel) -> list[dict[str, Any]]:
+def _skinned(skin: Skin, buffer: _Buffer, numbers: dict[str, int]) -> list[dict[str, Any]]:
     """Primitives of the skin, one for each material, on shared vertices."""
-    if [segment.name for segment in body.segments] != list(skin.segments):
-        raise MotionFileError(f"body {body.name!r} has other segments than its surface; valid: the same ones")
     weights = skin.weights.astype("<f4")
     weights /= weights.sum(axis=1, keepdims=True)
     attributes = {
@@ -183,12 +194,25 @@ def _animation(
     body: BodyModel, motion: Motion, nodes: list[dict[str, Any]], buffer: _Buffer
 ) -> dict[str, Any]:
     """Rotations of all joints and places of the root over time; other joints get their fixed places."""
+    time = buffer.add(motion.time - motion.time[0], "SCALAR", bounds=True)
+    samplers, channels = list[dict[str, Any]](), list[dict[str, Any]]()
+    for number, (keys, places) in enumerate(joint_tracks(body, motion)):
+        nodes[number] |= {"translation": places[0].tolist(), "rotation": keys[0].tolist()}
+        tracks = [("rotation", buffer.add(keys, "VEC4"))]
+        if body.segments[number].parent is None:
+            tracks.append(("translation", buffer.add(places, "VEC3")))
+        for path, output in tracks:
+            channels.append({"sampler": len(samplers), "target": {"node": number, "path": path}})
+            samplers.append({"input": time, "output": output, "interpolation": "LINEAR"})
+    return {"name": "motion", "samplers": samplers, "channels": channels}
+
+
+def joint_tracks(body: BodyModel, motion: Motion) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Of each segment its continuous xyzw quaternions (n, 4) and places (n, 3) [m] in its parent's frame."""
     frames = [segment_frames(body, q) for q in motion.q]
     rotations = np.array([turn for turn, _ in frames])
     origins = np.array([place for _, place in frames])
     names = [segment.name for segment in body.segments]
-    time = buffer.add(motion.time - motion.time[0], "SCALAR", bounds=True)
-    samplers, channels = list[dict[str, Any]](), list[dict[str, Any]]()
     for number, segment in enumerate(body.segments):
         turns, places = rotations[:, number], origins[:, number]
         if segment.parent is not None:
@@ -196,15 +220,7 @@ def _animation(
             inverse = rotations[:, parent].transpose(0, 2, 1)
             turns = inverse @ turns
             places = np.einsum("nij,nj->ni", inverse, places - origins[:, parent])
-        keys = continuous(Rotation.from_matrix(turns).as_quat())
-        nodes[number] |= {"translation": places[0].tolist(), "rotation": keys[0].tolist()}
-        tracks = [("rotation", buffer.add(keys, "VEC4"))]
-        if segment.parent is None:
-            tracks.append(("translation", buffer.add(places, "VEC3")))
-        for path, output in tracks:
-            channels.append({"sampler": len(samplers), "target": {"node": number, "path": path}})
-            samplers.append({"input": time, "output": output, "interpolation": "LINEAR"})
-    return {"name": "motion", "samplers": samplers, "channels": channels}
+        yield continuous(Rotation.from_matrix(turns).as_quat()), places
 
 
 def continuous(quaternions: FloatArray) -> FloatArray:
