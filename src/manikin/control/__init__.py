@@ -1,11 +1,17 @@
 """Control: weighted multi-task inverse dynamics that follows a planned motion."""
 
 from manikin.control.controller import Controller, ControlOutput
-from manikin.control.settings import ControlSettings, ReturnSettings, SupportSettings, TaskWeights
+from manikin.control.settings import (
+    ControlSettings,
+    ReturnSettings,
+    ShiftSettings,
+    SupportSettings,
+    TaskWeights,
+)
 from manikin.control.supports import SupportMode
 from manikin.control.tasks import ForceWish
 
 __all__ = [
-    "ControlOutput", "ControlSettings", "Controller", "ForceWish", "ReturnSettings", "SupportMode",
-    "SupportSettings", "TaskWeights",
+    "ControlOutput", "ControlSettings", "Controller", "ForceWish", "ReturnSettings", "ShiftSettings",
+    "SupportMode", "SupportSettings", "TaskWeights",
 ]  # fmt: skip

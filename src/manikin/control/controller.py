@@ -11,6 +11,7 @@ from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
 from manikin.control import edge_forces, tasks
 from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
+from manikin.control.capture_step import ShiftedPlan
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import ContactGeometry, contact_geometry, segment_key
 from manikin.control.partings import SelfWatch
@@ -81,6 +82,7 @@ class Controller:
 
     Attributes:
         clock: Time of the plan.
+        shift: Where the plan goes on, of a walker whose steps may be moved.
     """
 
     def __init__(
@@ -129,6 +131,8 @@ class Controller:
         self.reference = Reference(body, motion, frames, self.settings.period, horizon)
         self._solver, self._spare_solver = WarmQPSolver(), WarmQPSolver()
         self.clock = PlanClock(self.settings.period, self.settings.returning)
+        stepping = self.settings.stepping
+        self.shift = None if stepping is None else ShiftedPlan(schedule, stepping, self.settings.period)
         self._previous = np.zeros(joints)
         self._carried: dict[str, float] = {}
 
@@ -149,11 +153,14 @@ class Controller:
         state = self._dynamics.evaluate(q, v, self.carried_at(time))
         # Where the plan is at its own time, which passes now, and how far the body is from it.
         reference, deviation = self.reference.sample(time, rate, rate), None
+        if self.shift is not None:
+            reference = self.shift.moved(time, state, reference, supports, waits=rate < 1.0)
         if self.settings.returning is not None:
             deviation = deviation_from_plan(state, reference, supports)
             clock.advance(clock.next_rate(deviation))
             if clock.rate != rate:
-                reference = self.reference.sample(time, rate, clock.rate)
+                later = self.reference.sample(time, rate, clock.rate)
+                reference = later if self.shift is None else self.shift.applied(later)
         problem = self.problem(state, reference, supports, time, deviation)
         solution, fallback = self._solve(problem)
         x, iterations = np.zeros(len(problem.program.gradient)), 0

@@ -179,6 +179,32 @@ class ReturnSettings:
 
 
 @dataclass(frozen=True)
+class ShiftSettings:
+    """When and how far the steps of a pushed walker are moved; see ``manikin.control.capture_step``.
+
+    Attributes:
+        threshold: Deviation of the capture point, on one foot, from which the plan takes it over [m].
+        ankle: How far the pressure under the standing foot is moved against the deviation at most [m].
+        latest: A foot is not moved later than this before its landing [s].
+        narrowest: Least distance of a moved landing from the standing foot, across that [m].
+        widest: Largest such distance [m].
+        longest: Largest distance along it [m].
+    """
+
+    threshold: float = 0.02
+    ankle: float = 0.03
+    latest: float = 0.08
+    narrowest: float = 0.05
+    widest: float = 0.5
+    longest: float = 0.8
+
+    def __post_init__(self) -> None:
+        for name in ("threshold", "ankle", "latest", "widest", "longest"):
+            finite_number(getattr(self, name), f"shift setting {name!r}", above=0.0)
+        finite_number(self.narrowest, "shift setting 'narrowest'", at_least=0.0, at_most=self.widest)
+
+
+@dataclass(frozen=True)
 class ControlSettings:
     """Everything about the controller that can be tuned.
 
@@ -190,6 +216,7 @@ class ControlSettings:
         joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
         returning: What to do when the body is off its plan; None follows the plan as ever.
+        stepping: How the steps of a walk are moved when the body is off its plan; None never moves them.
         watch_toes: Whether toes that bounce off as a foot lands carry nothing until they are down again, and
             come down fast; for motions that land at speed.
     """
@@ -201,6 +228,7 @@ class ControlSettings:
     joint_limit_horizon: float = 0.05
     max_joint_acceleration: float = 500.0
     returning: ReturnSettings | None = None
+    stepping: ShiftSettings | None = None
     watch_toes: bool = False
 
     def __post_init__(self) -> None:

@@ -280,6 +280,8 @@ class _Run:
 
     def _report(self, wall: float, control: float) -> Execution:
         recorder, world, fell = self.recorder, self.world, self.failure.startswith("fell")
+        shift = self.controller.shift
+        moved = 0.0 if shift is None else float(np.hypot(*shift.body))
         # An arm that swings in a recovery may brush the body.
         pushed = min((push.start for push in self.pushes), default=np.inf)
         segments = {segment.name for segment in self.body.segments}
@@ -305,8 +307,8 @@ class _Run:
             realtime_factor=len(recorder.samples) * self.period / wall, wall_s=wall,
             control_ms=1e3 * control / len(recorder.samples), touches=world.touches, counted_touches=touches,
             fallbacks=tuple(fallbacks), max_slip_m=recorder.max_slip(), friction=recorder.friction_use(),
-            push=push_outcome(self.pushes, recorder, self.failure), schedule=recorder.delayed_schedule(),
-            final_foot_error_m=recorder.last_effector_error(),
+            push=push_outcome(self.pushes, recorder, self.failure, moved),
+            schedule=recorder.delayed_schedule(), final_foot_error_m=recorder.last_effector_error(),
         )  # fmt: skip
 
 

@@ -31,6 +31,7 @@ class PushOutcome:
         return_s: From the first push until the CoM is within :data:`BACK` of its plan for good [s], or None.
         waited_s: How long the plan waited for the body [s].
         max_foot_deviation_m: Largest distance of an effector from its plan at the end [m].
+        moved_m: How far the plan of a walk was moved by the end, by steps that caught the body [m].
     """
 
     impulse_Ns: float
@@ -41,10 +42,16 @@ class PushOutcome:
     return_s: float | None
     waited_s: float
     max_foot_deviation_m: float
+    moved_m: float = 0.0
 
 
-def push_outcome(pushes: Sequence[Push], recorder: Recorder, failure: str) -> PushOutcome | None:
-    """Outcome of the pushes of a recorded execution, None without one; ``failure`` is empty for a success."""
+def push_outcome(
+    pushes: Sequence[Push], recorder: Recorder, failure: str, moved: float = 0.0
+) -> PushOutcome | None:
+    """Outcome of the pushes of a recorded execution, None without one; ``failure`` is empty for a success.
+
+    ``moved`` is how far its plan was moved [m].
+    """
     if not pushes:
         return None
     first = min(pushes, key=lambda push: push.start)
@@ -58,7 +65,7 @@ def push_outcome(pushes: Sequence[Push], recorder: Recorder, failure: str) -> Pu
         direction_deg=float(np.degrees(np.arctan2(first.force[1], first.force[0]))), at_s=first.start,
         recovered=back is not None, max_deviation_m=float(errors[since >= -1e-9].max(initial=0.0)),
         return_s=back, waited_s=recorder.samples[-1].output.waited,
-        max_foot_deviation_m=recorder.last_effector_error(),
+        max_foot_deviation_m=recorder.last_effector_error(), moved_m=moved,
     )  # fmt: skip
 
 

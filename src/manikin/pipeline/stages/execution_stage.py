@@ -11,7 +11,7 @@ from joblib import cpu_count
 
 from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import ContactKind, ContactSchedule, FrictionModel, StanceSequence
-from manikin.control import ControlSettings, ReturnSettings, SupportSettings
+from manikin.control import ControlSettings, ReturnSettings, ShiftSettings, SupportSettings
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, StageFailure, place
 from manikin.planning import push_pull
@@ -231,13 +231,15 @@ def execute_motion(
     """Execute a motion, with the scenario's push and its act, and measure the result.
 
     A body that may be pushed is ready for it, but not told when or whence; see
-    :mod:`manikin.control.plan_return`.
+    :mod:`manikin.control.plan_return` and, of a walk, :mod:`manikin.control.capture_step`.
     """
     scenario, act = context.scenario, planned.act
     # The share of the friction that planning keeps to, where it has its own, holds in control too.
     supports = SupportSettings(friction_share=scenario.friction_share)
     returning = None if scenario.file.push is None else ReturnSettings()
-    settings = ControlSettings(supports=supports, returning=returning)
+    walks = scenario.file.push is not None and scenario.file.walking is not None
+    stepping = ShiftSettings() if walks else None
+    settings = ControlSettings(supports=supports, returning=returning, stepping=stepping)
     pushes, wishes = _pushes(scenario, planned.motion), () if act is None else tuple(act.wishes)
     result = execute(
         context.body, context.scene, planned.motion, planned.schedule,

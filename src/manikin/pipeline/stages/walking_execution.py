@@ -113,7 +113,7 @@ def walk_before(context: RunContext, report: Report, planned: PlannedMotion) -> 
 
 
 @dataclass(frozen=True, eq=False)
-class _Attempt:
+class _TriedWalk:
     """A walk on a planned way, and that it meets nothing that stands there, or None where nothing does."""
 
     plan: PlannedWalks
@@ -165,17 +165,17 @@ def _walked(
 
 def _attempt(
     context: RunContext, plan: PlannedWalks, ends: Mapping[str, FloatArray] | None, last: FloatArray | None
-) -> _Attempt:
+) -> _TriedWalk:
     """Walk on a way, and look what the body meets."""
     height, rule = context.scene.floor_height or 0.0, walking.StepRule().scaled(context.body.stature or 1.75)
     with context.scenario.refusing(("walking",)):
         others = Scene(in_the_way(context.scene, context.body.stature or 2.0), None)
         stepped = walking.step_along(plan.route, rule, ends=ends, height=height, obstacles=plan.obstacles)
         walk = balanced_walk(context.body, stepped, friction=FRICTION, end=last, scene=others)
-    return _Attempt(plan, stepped, walk, _clearance(walk, others))
+    return _TriedWalk(plan, stepped, walk, _clearance(walk, others))
 
 
-def _report(context: RunContext, report: Report, attempt: _Attempt) -> None:
+def _report(context: RunContext, report: Report, attempt: _TriedWalk) -> None:
     """Tell what was measured of a walk, what it has to keep, and the first that it does not."""
     walk, beside, block = attempt.walk, attempt.beside, path_block(attempt.plan, attempt.stepped)
     block["min_clearance_m"] = None if beside is None else beside.measured
