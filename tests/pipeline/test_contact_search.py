@@ -67,6 +67,19 @@ def test_a_scenario_with_planned_supports_can_be_kept_and_run_again(tmp_path):
         assert (one.key, one.offset) == (other.key, other.offset)
 
 
+def test_who_can_crawl_below_a_table_does_not_climb_over_it(tmp_path):
+    """Its top was the only way for feet, on which steps were sought for minutes and crawling never."""
+    scene = [{"name": "table", "box": [0.6, 5.0, 0.04], "position": [1.3, 0.0, 0.74]}]
+    task = {"start": {"at": [0.0, 0.0]}, "goal": {"at": [2.6, 0.0]}}
+    path = tmp_path / "table.yaml"
+    path.write_text(yaml.safe_dump({"name": "table", "scene": scene, "task": task}))
+    found, _, _ = search(str(path))
+    assert any("left_knee" in stage.contacts for stage in found.plan.stages)
+    assert (
+        max(contact.position[2] for stage in found.plan.stages for contact in stage.contacts.values()) < 0.2
+    )
+
+
 def test_the_same_seed_has_the_same_contacts():
     one, _, _ = search("crouch")
     other, _, _ = search.__wrapped__("crouch")

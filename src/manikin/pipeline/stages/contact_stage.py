@@ -101,10 +101,15 @@ class _FootSearch(_ContactSearch):
             if rising.failure is not None:
                 return self._tally.failed(f"the goal: {rising.failure}", "goal")
             goal = rising.stages[-1]
-        self._start, found = start, self._walked(start, goal)
+        self._start, walk, crawl = start, self._searched(start, goal), None
+        if walk.search.climbs() and self._brace is None:  # who can crawl below does not climb over
+            crawl = self._crawl(walk, start, goal)
+            if crawl.plan is not None:
+                return self._result(crawl)
+        found = self._walked(start, walk)
         walk = self._search
         if found.plan is None and isinstance(walk, WalkSearch) and walk.search.walled_off() is not None:
-            self._search, crawl = None, self._crawl(walk, start, goal)
+            self._search, crawl = None, crawl or self._crawl(walk, start, goal)
             found = replace(crawl, failure=f"{found.failure}; crawling: {crawl.failure}")
         return self._result(found)
 
@@ -151,21 +156,21 @@ class _FootSearch(_ContactSearch):
         self._brace = self._braces.pop(0)
         return arrival(self._brace)
 
-    def _walked(self, start: Stage, goal: Stage) -> Extension:
+    def _walked(self, start: Stage, walk: WalkSearch) -> Extension:
         """The way to a goal, at an act to the first posture that acts to which there is one."""
         while True:
-            walk = self._search = self._searched(start, goal)
+            self._search = walk
             found = walk.run()
             if found.plan is not None or not self._braces:
                 return found
-            goal = self._next_act()
+            walk = self._searched(start, self._next_act())
 
     def _again(self, phase: int, reason: str) -> ContactSearch:
         """Another way, or another posture that acts where the phase comes after the way."""
         walked = self._search is not None and self._search.refuse(phase)
         if walked or not self._braces or self._start is None:
             return super()._again(phase, reason)
-        return self._result(self._walked(self._start, self._next_act()))
+        return self._result(self._walked(self._start, self._searched(self._start, self._next_act())))
 
 
 STANDING_HEIGHT = 0.92

@@ -183,6 +183,11 @@ class FootstepSearch:
         """Why no way over the ground leads from the start to the goal; None where one does."""
         return None if min(self._ahead[:2]) < math.inf else self._field.walled_off(self.holds[0].position)
 
+    def climbs(self) -> bool:
+        """Whether the easiest way over the ground has a step that feet alone do not make."""
+        way = self._field.way(self.holds[0].position)
+        return way is not None and bool((np.abs(np.diff(way[:, 2])) > HIGHEST * self._scale).any())
+
     def _at_goal(self, node: _Node) -> bool:
         return node.hold == (2 if node.side > 0 else 3)
 
