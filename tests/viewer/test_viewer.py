@@ -282,3 +282,51 @@ def test_a_recording_is_shown_beside_its_plan(finished_run):
             viewer.put_beside("replayed")
     finally:
         viewer.close()
+
+
+class Keeper:
+    """What a session needs of a browser to which it sends files and messages."""
+
+    def __init__(self):
+        self.files, self.messages = {}, []
+
+    def send_file_download(self, name, content):
+        self.files[name] = content
+
+    def add_notification(self, _title, body, **_options):
+        self.messages.append(body)
+
+
+def test_a_film_of_the_motion_shown_is_sent_and_a_reason_against_it_said(finished_run):
+    from manikin.viewer.session import ViewerSession
+
+    labels, visitor = [], Keeper()
+
+    def film(content, name, kind, progress):
+        if len(labels) == 2:
+            page.close()
+        progress(0.5)
+        labels.append(page._film_button.label)
+        if kind == "mp4":
+            raise InputError("mp4 needs imageio-ffmpeg")
+        page.send_film(visitor, kind)  # a second one meanwhile is not made
+        return f"{name} of {len(content.motions)}".encode()
+
+    page = ViewerSession(finished_run, Door(0), film=film)
+    try:
+        page.choose("planned")
+        page.send_film(visitor, "gif")
+        page.send_film(visitor, "mp4")
+        assert visitor.files == {"planned.gif": b"planned of 2"}
+        assert visitor.messages == ["mp4 needs imageio-ffmpeg"]
+        assert labels == ["Film: 50 %"] * 2
+        assert (page._film_button.label, page._film_button.disabled) == ("Save a film", False)
+        page.send_film(visitor, "gif")
+        assert visitor.messages[-1] == "film was not made; valid: with the page open"
+    finally:
+        page.close()
+
+
+def test_without_a_maker_there_is_no_film(session):
+    assert not session._film_button.visible
+    session.send_film(Keeper(), "gif")

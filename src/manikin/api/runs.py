@@ -101,7 +101,9 @@ class Run(Displayed):
 
     def view(self, port: int = 8080) -> None:
         """Play the motion in the browser until Ctrl-C, on this computer only."""
-        serve(self.record.content, port, print)
+        from manikin.reports.export import film_of_motion
+
+        serve(self.record.content, port, print, film=film_of_motion)
 
     def export(
         self, format_name: str, out: str | Path | None = None, *, which: str | None = None,
@@ -393,7 +395,10 @@ class MeasuredRecording(Displayed):
 
     def view(self, port: int = 8080) -> None:
         """Show the measured motion in the browser until Ctrl-C."""
-        serve(MotionFile(recorded=self.analysis.motion, body=self.analysis.body), port, print)
+        from manikin.reports.export import film_of_motion
+
+        content = MotionFile(recorded=self.analysis.motion, body=self.analysis.body)
+        serve(content, port, print, film=film_of_motion)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -55,7 +55,7 @@ def view(
 
         job = load_scene(source)
         directory = Path("runs") / job.name if out is None else out
-        serve_task(job, partial(_planned, directory), port, console.announce, host=host)
+        serve_task(job, partial(_planned, directory), port, console.announce, host=host, film=_film)
         return
     from manikin.motion.file import read_motions
     from manikin.pipeline.run_directory import other_motions
@@ -64,7 +64,14 @@ def view(
     others = {name: read_motions(path) for name, path in other_motions(Path(source)).items()}
     from manikin.viewer import serve
 
-    serve(content, port=port, announce=console.announce, others=others, host=host)
+    serve(content, port=port, announce=console.announce, others=others, host=host, film=_film)
+
+
+def _film(*wanted: Any) -> bytes:
+    """Make a film that a visitor of the page asks for, see :func:`manikin.reports.export.film_of_motion`."""
+    from manikin.reports.export import film_of_motion
+
+    return film_of_motion(*wanted)
 
 
 def _planned(directory: Path, job: "Scenario", progress: Callable[..., None]) -> "Planned":

@@ -115,6 +115,28 @@ def _linear(array: FloatArray, before: np.ndarray, share: FloatArray) -> FloatAr
     return np.where(weight == 0.0, array[before], (1.0 - weight) * array[before] + weight * array[after])
 
 
+def film_of_motion(
+    content: MotionFile, which: str, format_name: str, progress: Callable[[float], object]
+) -> bytes:
+    """Content of an MP4 or GIF file of a motion, of the rate and size that exports have by default.
+
+    Args:
+        content: What the motion file holds.
+        which: Name of the motion.
+        format_name: ``"mp4"`` or ``"gif"``.
+        progress: Told the share that is done.
+
+    Raises:
+        InputError: If the motion or a library is not available.
+        MotionFileError: If there is no body, or nothing of it to draw.
+    """
+    if content.body is None:
+        raise MotionFileError("motion file holds no body; valid: one with a body for a film")
+    rate, write = _FORMATS[format_name].rate or 0.0, {"mp4": to_mp4, "gif": to_gif}[format_name]
+    film = Film(content.body, resample(pick_motion(content, which), rate), content.scene, SIZE)
+    return write(film, rate, progress)
+
+
 @dataclass(frozen=True)
 class ExportOptions:
     """What a caller may say about the file besides its rate.

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from manikin.viewer.door import Door
     from manikin.viewer.drive import LiveContacts
     from manikin.viewer.placing import Plan
+    from manikin.viewer.session import FilmMaker
     from manikin.walking import WalkController
 
 __all__ = ["serve", "serve_contacts", "serve_drive", "serve_task"]
@@ -24,6 +25,7 @@ THIS_COMPUTER = "127.0.0.1"
 def serve(
     content: MotionFile, port: int = 8080, announce: Callable[[str], None] | None = None, *,
     others: Mapping[str, MotionFile] | None = None, host: str = THIS_COMPUTER,
+    film: FilmMaker | None = None,
 ) -> None:  # fmt: skip
     """Show a motion file in the browser until Ctrl-C.
 
@@ -34,18 +36,19 @@ def serve(
         others: Motions of others who are there, by name.
         host: Address to listen to; any but one of this computer alone lets in who has the token of the page,
             which is part of the address that is announced.
+        film: Makes the films that visitors ask for; None for no films.
 
     Raises:
         InputError: If the file holds no body, or, as of the other pages, the port is taken.
     """
     from manikin.viewer.session import ViewerSession
 
-    _run(ViewerSession(content, _door(port, host), others), announce)
+    _run(ViewerSession(content, _door(port, host), others, film=film), announce)
 
 
 def serve_task(
     job: Scenario, plan: Plan, port: int = 8080, announce: Callable[[str], None] | None = None, *,
-    host: str = THIS_COMPUTER,
+    host: str = THIS_COMPUTER, film: FilmMaker | None = None,
 ) -> None:  # fmt: skip
     """Let the user place start and goal in a scene, plan the task and watch the motion, until Ctrl-C.
 
@@ -55,6 +58,7 @@ def serve_task(
         port: Port to listen on; 0 picks a free one.
         announce: Told the page's address when it can be opened.
         host: Address to listen to.
+        film: Makes the films that visitors ask for; None for no films.
 
     Raises:
         InputError: If the body or the scene is of no use here.
@@ -69,7 +73,8 @@ def serve_task(
         if page.planned is None or page.planned.content is None:
             return
         job = page.scenario()
-        session = ViewerSession(page.planned.content, door, verdict=page.planned.words, before=page)
+        words = page.planned.words
+        session = ViewerSession(page.planned.content, door, verdict=words, before=page, film=film)
         _run(session, None)
 
 

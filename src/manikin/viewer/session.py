@@ -1,7 +1,8 @@
 """One viewer in the browser: the scene, the body, the controls and their state."""
 
 import io
-from collections.abc import Mapping
+import threading
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,9 @@ VIEWS = {"front": (2.8, 0.0, 0.4), "behind": (-2.8, 0.0, 0.6), "left": (0.0, 2.8
 """Where the camera stands from the centre of mass: ahead on the way, to its left, upward [m]."""
 LARGEST_PICTURE = (1080, 1920)
 """Height and width of a picture, at most [pixels]."""
+FILMS = ("mp4", "gif")
+FilmMaker = Callable[[MotionFile, str, str, Callable[[float], object]], bytes]
+"""Makes a film of a motion of a file, by its name, in one of :data:`FILMS`; told the share that is done."""
 
 
 class ViewerSession(Page):
@@ -66,12 +70,12 @@ class ViewerSession(Page):
 
     def __init__(
         self, content: MotionFile, door: Door, others: Mapping[str, MotionFile] | None = None,
-        verdict: str | None = None, before: Page | None = None,
+        verdict: str | None = None, before: Page | None = None, film: FilmMaker | None = None,
     ) -> None:  # fmt: skip
         """Start the server and draw the first instant, with others who are there on the same clock, by name.
 
         A verdict is of a task that was placed on the page before, whose server this one then has, and a
-        button to place it anew.
+        button to place it anew. With a maker of films there is a button for one.
 
         Raises:
             InputError: If a file holds no body.
@@ -82,13 +86,14 @@ class ViewerSession(Page):
             if other.body is None or not other.motions:
                 problem = f"motion of {name} holds no body or no motion"
                 raise InputError(f"{problem}; valid: as 'manikin run' wrote it")
-        self.content, self._body = content, content.body
+        self.content, self._body, self._film = content, content.body, film
         self.chosen = list(content.motions)[-1]
         self.beside = "recorded" if content.recorded is not None and self.chosen != "recorded" else NOTHING
         self.playing, self.speed, self.looping, self.following = False, 1.0, False, False
         self._painting, self.plotted = AS_IT_IS, MARGIN
         self.apart, self.again = BESIDE, False
         self._feet: dict[str, FloatArray] = {}
+        self._filming = threading.Lock()
         if content.body.is_point_mass:
             names = self.motion.contact_names
             self._feet = effector_positions(content.body, self.motion, names, content.schedule)
@@ -264,6 +269,30 @@ class ViewerSession(Page):
         Image.fromarray(client.get_render(height, width, transport_format="png")).save(file, "PNG")
         client.send_file_download(f"{self.chosen}-{self.time:.3f}s.png", file.getvalue())
 
+    def send_film(self, client: viser.ClientHandle, kind: str) -> None:
+        """Make a film of the motion shown, in one of :data:`FILMS`, and let a visitor's browser keep it.
+
+        One at a time is made; what stands in its way is said on the page.
+        """
+        if self._film is None or not self._filming.acquire(blocking=False):
+            return
+        name, label = self.chosen, self._film_button.label
+        try:
+            self._film_button.disabled = True
+            client.send_file_download(f"{name}.{kind}", self._film(self.content, name, kind, self._filmed))
+        except InputError as error:
+            client.add_notification("No film", str(error), color="red")
+        finally:
+            if not self._closed.is_set():  # which a page that was left is, too
+                self._film_button.label, self._film_button.disabled = label, False
+            self._filming.release()
+
+    def _filmed(self, share: float) -> None:
+        """Show how much of a film is made, unless the page is closed."""
+        if self._closed.is_set():
+            raise InputError("film was not made; valid: with the page open")
+        self._film_button.label = f"Film: {100.0 * share:.0f} %"
+
     # --- what stands still ---------------------------------------------------------------
 
     def _build_scene(self) -> None:
@@ -375,6 +404,11 @@ class ViewerSession(Page):
                 "the largest of the motion, yellow half of it, red none, dark less.",
             )  # fmt: skip
             picture = gui.add_button("Save a picture")
+            kinds = gui.add_dropdown("film as", FILMS, visible=self._film is not None)
+            self._film_button = gui.add_button(
+                "Save a film", visible=self._film is not None,
+                hint="Of the motion shown, from a camera that goes along; about a second for each picture.",
+            )  # fmt: skip
         with gui.add_folder("Now"):
             self._text = gui.add_markdown("")
         self._plot_folder = gui.add_folder("Over time")
@@ -399,6 +433,9 @@ class ViewerSession(Page):
         painting.on_update(lambda _: self.paint_by(painting.value))
         apart.on_update(lambda _: self.set_apart(apart.value))
         picture.on_click(lambda event: None if event.client is None else self.send_picture(event.client))
+        self._film_button.on_click(
+            lambda event: None if event.client is None else self.send_film(event.client, kinds.value)
+        )
         plotted.on_update(lambda _: self.plot(plotted.value))
 
     def _quantity(self, motion: Motion) -> FloatArray:

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from manikin.errors import InputError
-from manikin.reports.export import ExportOptions, export_motion, resample
+from manikin.reports.export import ExportOptions, export_motion, film_of_motion, resample
 from manikin.reports.formats.video import Film, film_size, to_gif, to_mp4
 from manikin.scene import Box, Obstacle, Scene
 
@@ -121,3 +121,16 @@ def test_bad_films_give_one_line(content, tmp_path):
     with pytest.raises(InputError, match="frames; valid: at most"):
         export_motion(content, tmp_path, "gif", rate=5000.0, options=SMALL)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_for_the_page_is_that_of_the_export(content, monkeypatch):
+    """Of the first two pictures, 1/12.5 s apart, and small."""
+    short = resample(content.planned, 12.5)
+    first = replace(short, **{name: array[:2] for name, array in short.arrays().items()})
+    monkeypatch.setattr("manikin.reports.export.SIZE", SMALL.size)
+    told = []
+    data = film_of_motion(replace(content, planned=first), "planned", "gif", told.append)
+    image = Image.open(BytesIO(data))
+    assert (image.n_frames, image.size, told) == (2, SMALL.size, [0.5, 1.0])
+    with pytest.raises(InputError, match="motion is 'executed'"):
+        film_of_motion(content, "executed", "gif", told.append)
