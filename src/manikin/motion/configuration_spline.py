@@ -166,6 +166,54 @@ def turn_derivatives(rho: FloatArray, rho_1: FloatArray, rho_2: FloatArray) -> T
     return TurnDerivatives(omega_by_value, by_second, alpha_by_value, alpha_by_rate, by_second)
 
 
+def by_raw_spline(
+    by_state: Sequence[FloatArray], states: StateSamples, raw: Sequence[FloatArray], tangent: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Derivatives by raw spline values, rates and second derivatives, from those by Pinocchio's states.
+
+    The pelvis' velocity and acceleration, in its own frame, depend on its raw attitude, too: with ``R`` the
+    pelvis-to-world rotation and ``p`` its place, ``v = R^T p'`` and ``a = R^T p'' - omega x v``.
+
+    Args:
+        by_state: Three (n, m, nv), by the tangent of the configuration, by velocity and by acceleration.
+        states: That the raw values give.
+        raw: Three (n, nq) values, rates and second derivatives.
+        tangent: (n, 7, 7) :func:`tangent_map`.
+
+    Returns:
+        Three (n, m, nq).
+    """
+    turn = turn_derivatives(*(part[:, 3:7] for part in raw))
+    turned, to_pelvis = tangent[:, 3:6, 3:7], tangent[:, :3, :3]
+    linear, omega = skew(states.v[:, :3]), skew(states.v[:, 3:6])
+    pulled = skew(states.a[:, :3] + np.cross(states.v[:, 3:6], states.v[:, :3]))
+
+    def pelvis(by_place: FloatArray | float, by_turn: FloatArray | float, turning: FloatArray) -> FloatArray:
+        block = np.zeros((len(tangent), 6, 7))
+        block[:, :3, :3], block[:, :3, 3:], block[:, 3:, 3:] = by_place, by_turn, turning
+        return block
+
+    velocity = (
+        pelvis(0.0, linear @ turned, turn.omega_by_value), pelvis(to_pelvis, 0.0, turn.omega_by_rate)
+    )  # fmt: skip
+    falling = (pulled - omega @ linear) @ turned + linear @ turn.omega_by_value
+    acceleration = (
+        pelvis(0.0, falling, turn.alpha_by_value),
+        pelvis(-omega @ to_pelvis, linear @ turn.omega_by_rate, turn.alpha_by_rate),
+        pelvis(to_pelvis, 0.0, turn.alpha_by_second),
+    )
+    by_q, by_v, by_a = (part[:, :, :6] for part in by_state)
+    own = (
+        by_q @ tangent[:, :6] + by_v @ velocity[0] + by_a @ acceleration[0],
+        by_v @ velocity[1] + by_a @ acceleration[1],
+        by_a @ acceleration[2],
+    )
+    first, second, third = (
+        np.concatenate([part, whole[:, :, 6:]], axis=2) for part, whole in zip(own, by_state, strict=True)
+    )
+    return first, second, third
+
+
 def align_quaternions(configurations: FloatArray) -> FloatArray:
     """Flip quaternion signs so that consecutive rows lie in the same half-space."""
     aligned = np.array(configurations, dtype=float)

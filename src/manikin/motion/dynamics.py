@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.body.strength import with_masses
 from manikin.contact import CarriedLoad, ContactSchedule
-from manikin.motion.configuration_spline import StateSamples, states_from_raw, tangent_map, turn_derivatives
+from manikin.motion.configuration_spline import StateSamples, by_raw_spline, states_from_raw, tangent_map
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, rotation_from_quaternion, skew
 from manikin.scene.distance import moves_by_joint
@@ -36,9 +36,7 @@ class MomentumRateSamples:
     """Collects Pinocchio's derivatives sample by sample, those by acceleration in ``by_a`` (n, 6, nv)."""
 
     def __init__(self, model: pin.Model, count: int) -> None:
-        self._model = model
-        self._mass = float(pin.computeTotalMass(model))
-        self._value = np.zeros((count, 6))
+        self._model, self._value = model, np.zeros((count, 6))
         self._by_q, self._by_v, self.by_a = np.zeros((3, count, 6, model.nv))
 
     def record(self, sample: int, data: pin.Data, states: StateSamples) -> None:
@@ -53,25 +51,8 @@ class MomentumRateSamples:
         self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
     ) -> MomentumRate:
         """Differentiate by raw values, rates and second derivatives (n, nq), with :func:`tangent_map`."""
-        turn = turn_derivatives(*(part[:, 3:7] for part in raw))
-        by_raw, by_rate, by_second = np.zeros((3, *self._by_q.shape[:2], raw[0].shape[1]))
-        by_raw[:, :, 7:], by_rate[:, :, 7:] = self._by_q[:, :, 6:], self._by_v[:, :, 6:]
-        by_second[:, :, 7:] = self.by_a[:, :, 6:]
-        # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
-        by_omega = self._by_v[:, :, 3:6] + self.by_a[:, :, :3] @ skew(states.v[:, :3])
-        by_alpha = self.by_a[:, :, 3:6]
-        # All of the momentum's rate turns with the pelvis, but for the part of the pelvis' own acceleration.
-        turning = self._value.copy()
-        turning[:, :3] -= self._mass * raw[2][:, :3]
-        pelvis_to_world = tangent[:, :3, :3].transpose(0, 2, 1)
-        halves = turning[:, :3], turning[:, 3:]
-        turned = [-skew(part) @ pelvis_to_world @ tangent[:, 3:6, 3:7] for part in halves]
-        by_raw[:, :, 3:7] = np.concatenate(turned, axis=1) + by_omega @ turn.omega_by_value
-        by_raw[:, :, 3:7] += by_alpha @ turn.alpha_by_value
-        by_rate[:, :, 3:7] = by_omega @ turn.omega_by_rate + by_alpha @ turn.alpha_by_rate
-        by_second[:, :, 3:7] = by_alpha @ turn.alpha_by_second
-        by_second[:, :3, :3] = self._mass * np.eye(3)
-        return MomentumRate(self._value, (by_raw, by_rate, by_second))
+        by_state = self._by_q, self._by_v, self.by_a
+        return MomentumRate(self._value, by_raw_spline(by_state, states, raw, tangent))
 
 
 @dataclass(frozen=True, eq=False)

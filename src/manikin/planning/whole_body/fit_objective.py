@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from manikin.body import BodyModel
+from manikin.motion.configuration_spline import by_raw_spline
 from manikin.motion.dynamics import MomentumRate, MotionSampler, MotionSamples
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.numerics.spatial import FloatArray, rotation_vector, rotation_vector_jacobian, skew
@@ -298,7 +299,8 @@ class MotionObjective:
         found = excess_torque(
             self._body, motion.states, motion.shapes.jacobians, self._forces, scales.strength_share
         )
-        rows = (to_raw(by, motion.tangent) / scales.torque_share for by in found.by_state)
+        by_raw = by_raw_spline(found.by_state, motion.states, motion.raw, motion.tangent)
+        rows = (by / scales.torque_share for by in by_raw)
         first, second, third = (
             np.concatenate(pair, axis=1) for pair in zip(out.momentum.jacobians, rows, strict=True)
         )
