@@ -134,7 +134,8 @@ def _walked(
 ) -> BalancedWalk | None:  # fmt: skip
     """The walk in balance on a way, reported; None where there is none.
 
-    A walk that comes too near to something is tried again on ways with so much more room, as often as it may.
+    A walk that comes too near to something is tried again on ways with so much more room, while there are
+    some, and :data:`AGAIN` times at most.
 
     Args:
         find: Gives the way, and (3,) x, y [m], yaw [rad] where each foot stands at the end, or None for
@@ -147,11 +148,11 @@ def _walked(
     best, further = _attempt(context, plan, ends, last), 0.0
     lack = best.lack
     for _ in range(AGAIN):
-        if lack <= 0.0:
+        if lack <= 0.0 or not plan.whole:
             break
         further += lack + SPARE
         plan, ends = find(further)
-        if not plan.route.succeeded:
+        if not plan.whole:
             break
         tried = _attempt(context, plan, ends, last)
         lack = tried.lack

@@ -92,12 +92,14 @@ class PlannedWalks:
     Attributes:
         obstacles: What stands there, and the others.
         wall_s: Time in which the body's own route was found [s].
+        whole: Whether that route keeps room for the whole of the body, see :data:`WHOLE`.
     """
 
     route: WalkRoute
     others: dict[str, WalkRoute]
     obstacles: tuple[walking.WalkObstacle, ...]
     wall_s: float
+    whole: bool = False
 
 
 def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
@@ -196,9 +198,10 @@ def plan_walks(
     if section.whole_body == "balanced":
         with suppress(ScenarioError):  # an end leaves no room for it
             route = route_of(("walking",), section, start, Waypoint(goal), walker=WHOLE, further=further)
-    if route is None or not route.succeeded:
+    whole = route is not None and route.succeeded
+    if route is None or not whole:
         route = route_of(("walking",), section, start, Waypoint(goal))
-    return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began)
+    return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began, whole)
 
 
 def _section(scenario: Scenario) -> WalkingSection:
