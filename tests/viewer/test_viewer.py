@@ -3,6 +3,7 @@
 import http.client
 import socket
 import threading
+import types
 import urllib.request
 from dataclasses import replace
 
@@ -325,6 +326,19 @@ def test_a_film_of_the_motion_shown_is_sent_and_a_reason_against_it_said(finishe
         assert visitor.messages[-1] == "film was not made; valid: with the page open"
     finally:
         page.close()
+
+
+def test_controls_show_what_was_chosen_and_what_is_chosen_with_them_is_followed(session):
+    session.put_beside("planned")
+    session.paint_by("margin")
+    session.set_apart(0.5)
+    assert (session._beside_box.value, session._painting_box.value) == ("planned", "margin")
+    assert session._apart_slider.value == 0.5
+    handle = session._motions_box
+    handle._impl.value = "planned"  # as a visitor does it
+    for callback in handle._impl.update_cb:
+        callback(types.SimpleNamespace(client=object(), client_id=0, target=handle))
+    assert session.chosen == "planned"
 
 
 def test_without_a_maker_there_is_no_film(session):

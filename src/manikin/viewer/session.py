@@ -3,6 +3,7 @@
 import io
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -145,7 +146,7 @@ class ViewerSession(Page):
         """
         self._check(name, *self.content.motions)
         with self._lock:
-            self.chosen = name
+            self.chosen = self._motions_box.value = name
             self.show(self.time)
 
     @staticmethod
@@ -161,7 +162,7 @@ class ViewerSession(Page):
         """
         self._check(name, NOTHING, *self.content.motions)
         with self._lock:
-            self.beside = name
+            self.beside = self._beside_box.value = name
             if name != NOTHING:
                 self._second.paint(COLOURS[name])
             self.show(self.time)
@@ -226,7 +227,7 @@ class ViewerSession(Page):
         if quantity not in PAINTINGS:
             raise InputError(f"colour is by {quantity!r}; valid: {', '.join(PAINTINGS)}")
         with self._lock:
-            self._painting = quantity
+            self._painting = self._painting_box.value = quantity
             self._shapes.paint(None)
             self.show_shapes(self._shapes_box.value)
             self.show(self.time)
@@ -234,7 +235,7 @@ class ViewerSession(Page):
     def set_apart(self, distance: float) -> None:
         """Draw the motion beside at a distance from the motion shown [m]; 0 lays it over."""
         with self._lock:
-            self.apart = distance
+            self.apart = self._apart_slider.value = distance
             self.show(self.time)
 
     def place_anew(self) -> None:
@@ -252,7 +253,7 @@ class ViewerSession(Page):
             joints = ", ".join(self._body.joint_names)
             raise InputError(f"quantity is {quantity!r}; valid: {MARGIN}, {joints}")
         with self._lock:
-            self.plotted = quantity
+            self.plotted = self._plotted_box.value = quantity
             self._plot.remove()
             self._build_plot()
             self.show(self.time)
@@ -387,9 +388,10 @@ class ViewerSession(Page):
             steps = gui.add_button_group("step [s]", tuple(STEPS))
             speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
             loop = gui.add_checkbox("loop", initial_value=False)
-            motions = gui.add_dropdown("motion", tuple(self.content.motions), initial_value=self.chosen)
-            beside = gui.add_dropdown("beside", (NOTHING, *self.content.motions), initial_value=self.beside)
-            apart = gui.add_slider("apart [m]", 0.0, 2.0, 0.1, self.apart)
+            names = tuple(self.content.motions)
+            self._motions_box = gui.add_dropdown("motion", names, initial_value=self.chosen)
+            self._beside_box = gui.add_dropdown("beside", (NOTHING, *names), initial_value=self.beside)
+            self._apart_slider = gui.add_slider("apart [m]", 0.0, 2.0, 0.1, self.apart)
         with gui.add_folder("View"):
             views = gui.add_button_group("from", tuple(VIEWS))
             follow = gui.add_checkbox("follow the body", initial_value=False)
@@ -398,7 +400,7 @@ class ViewerSession(Page):
                 "collision shapes", initial_value=not self._shapes.has_surface
             )
             self._shapes_box.visible = self._shapes.has_surface
-            painting = gui.add_dropdown(
+            self._painting_box = gui.add_dropdown(
                 "colour by", PAINTINGS, initial_value=AS_IT_IS,
                 hint="Torque over its limit: grey none, yellow half, red all of it, dark more. Margin: grey "
                 "the largest of the motion, yellow half of it, red none, dark less.",
@@ -413,30 +415,36 @@ class ViewerSession(Page):
             self._text = gui.add_markdown("")
         self._plot_folder = gui.add_folder("Over time")
         with self._plot_folder:
-            plotted = gui.add_dropdown(
+            self._plotted_box = gui.add_dropdown(
                 "of", (MARGIN, *self._body.joint_names), initial_value=MARGIN,
                 hint="The margin, or the torque of a joint over its limit.",
             )  # fmt: skip
         self._build_plot()
-        # The slider is followed unless it was this session that moved it.
-        self._slider.on_update(lambda event: None if event.client is None else self.show(self._slider.value))
+        # What shows the state is followed unless it was this session that changed it.
+        for handle, follows in (
+            (self._slider, self.show), (self._motions_box, self.choose), (self._beside_box, self.put_beside),
+            (self._apart_slider, self.set_apart), (self._painting_box, self.paint_by),
+            (self._plotted_box, self.plot),
+        ):  # fmt: skip
+            handle.on_update(partial(self._changed, follows))
         self._button.on_click(lambda _: self.pause() if self.playing else self.play())
         steps.on_click(lambda _: self.step(STEPS[steps.value]))
         speed.on_update(lambda _: setattr(self, "speed", float(speed.value)))
         loop.on_update(lambda _: setattr(self, "looping", loop.value))
-        motions.on_update(lambda _: self.choose(motions.value))
-        beside.on_update(lambda _: self.put_beside(beside.value))
         views.on_click(lambda _: self.look(views.value))
         follow.on_update(lambda _: setattr(self, "following", follow.value))
         self._forces.on_update(lambda _: self.show(self.time))
         self._shapes_box.on_update(lambda _: self.show_shapes(self._shapes_box.value))
-        painting.on_update(lambda _: self.paint_by(painting.value))
-        apart.on_update(lambda _: self.set_apart(apart.value))
         picture.on_click(lambda event: None if event.client is None else self.send_picture(event.client))
         self._film_button.on_click(
             lambda event: None if event.client is None else self.send_film(event.client, kinds.value)
         )
-        plotted.on_update(lambda _: self.plot(plotted.value))
+
+    @staticmethod
+    def _changed(follows: Callable[[Any], object], event: "viser.GuiEvent[Any]") -> None:
+        """Take over what a visitor chose."""
+        if event.client is not None:
+            follows(event.target.value)
 
     def _quantity(self, motion: Motion) -> FloatArray:
         """(n,) what is plotted of a motion."""
