@@ -249,6 +249,13 @@ def test_every_moving_picture_is_shown_and_small():
     assert [file.name for file in files if file.stat().st_size > 300_000] == []
 
 
+def test_every_picture_of_a_page_is_shown_and_all_are_small():
+    files = sorted((DOCS / "images/pages").iterdir())
+    shown = re.findall(r"\(images/pages/([\w.]+)\)", PAGES["pages.md"])
+    assert sorted(shown) == [file.name for file in files]
+    assert sum(file.stat().st_size for file in files) <= 1_000_000
+
+
 def test_pages_fetch_nothing_from_other_sites():
     """What the theme would fetch is in the repository; ``docs/screenshots/shoot.mjs`` watches whole pages."""
     settings = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
