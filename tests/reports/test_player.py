@@ -112,16 +112,16 @@ console.log(JSON.stringify(shown));
 """
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="there is no node to run the page's script")
 def test_the_page_tells_only_of_what_is_shown(data):
     rest = {"pictures": {}, "values": {}, "contacts": [], "key_numbers": {}, "commands": ""}
     rest |= {"summary": {"scenario": "a", "succeeded": True, "requirements": []}, "verdict": "proved"}
     assert "Lines on the floor" in render("run", motion=data, **rest)
     alone = render("run", motion={**data, "floor": None, "scene": None}, **rest)
     assert "Lines on the floor" not in alone
-    assert "shines through" not in alone
+    assert "body shines through." not in alone
 
 
+@pytest.mark.skipif(shutil.which("node") is None, reason="there is no node to run the page's script")
 def test_the_script_plays_loops_pauses_and_places_the_segments(data, tmp_path):
     """Run by node with a stand-in for WebGL that keeps what the shader is given."""
     file, run = tmp_path / "data.json", tmp_path / "run.js"
