@@ -48,6 +48,13 @@ BODIES = [
 """Scenario, stature [m], mass [kg] and sex; those of the scenario where None."""
 
 
+THESES = (
+    "stand-up-sofa", "stand-up-sofa@hands", "stand-up-chair", "stand-up-chair@hands", "pull-rope@wall",
+    "truck-egress", "climb-wall",
+)  # fmt: skip
+"""Scenes of the theses from start and goal alone, to be done by people of other statures."""
+
+
 @pytest.mark.parametrize("name", EVERY)
 def test_every_scenario_ends_as_its_file_says(name):
     """A success stands on its feet in the physics engine; a failure names its stage and its reason."""
@@ -151,6 +158,14 @@ def test_other_bodies_do_the_same(name, stature, mass, sex):
     if name.startswith(("walk", "ramp-down")):
         assert result.summary["centroidal"]["min_zmp_distance_m"] > 0.0
         assert result.summary["wholebody"]["min_zmp_distance_m"] > 0.0
+
+
+@pytest.mark.parametrize("name", THESES)
+@pytest.mark.parametrize("stature", [1.60, 1.75, 1.88])
+def test_scenes_of_the_theses_are_proved_for_other_statures(name, stature):
+    """The mass is that of the scenario; measured in docs/refinement.md."""
+    result = manikin.run(load_scenario(name).with_body(stature, None, None))
+    assert result.succeeded, result.summary["failure"]
 
 
 @pytest.mark.parametrize(
