@@ -32,7 +32,7 @@ from manikin.planning.whole_body.fit_job import (
     sample_times,
 )
 from manikin.planning.whole_body.fit_scales import FitScales
-from manikin.planning.whole_body.posture_style import CLOSE, FAR, READY, reference_motion
+from manikin.planning.whole_body.posture_style import CLOSE, READY
 from manikin.runtime.parallel import Deadline
 from manikin.scene import Box, Obstacle, Scene
 
@@ -198,19 +198,6 @@ def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, 
     assert not result.succeeded
     assert "centre-of-mass error" in result.failure.reason
     assert result.failure.where.startswith("phase ")
-
-
-def test_key_postures_are_natural_although_those_of_the_contact_plan_lean_back(person, flat_ground, step_com):
-    """Each has the same contacts and centre of mass; none is near to the manner."""
-    instants = step_com.schedule.instants
-    preferred = reference_motion(person, step_com, instants, READY)
-    planned = np.array(preferred)
-    for name, angle in {"lumbar_flexion": -0.5, "thorax_flexion": -0.3, "shoulder_flexion": 1.2}.items():
-        planned[:, [7 + k for k, joint in enumerate(person.joint_names) if name in joint]] = angle
-    assert min(READY.strain(person, *pair) for pair in zip(preferred, planned, strict=True)) > FAR
-    found = find_key_postures(person, flat_ground, step_com, known=planned, ease=False)
-    assert found.failed == ()
-    assert max(READY.strain(person, q, p.q) for q, p in zip(preferred, found.postures, strict=True)) < FAR
 
 
 @pytest.mark.parametrize("led_is_caught", [False, pytest.param(True, marks=pytest.mark.long)])

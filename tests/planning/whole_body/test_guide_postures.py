@@ -10,7 +10,7 @@ from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.kinematics import PostureProblem, PostureResult, SolverSettings
 from manikin.numerics.spatial import rotation_from_quaternion
 from manikin.planning.whole_body.fit_targets import effector_targets, ignored_pairs
-from manikin.planning.whole_body.posture_style import FAR, NEAR, READY, Guide, plan_guide
+from manikin.planning.whole_body.posture_style import FAR, READY, plan_guide
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 posture_style = importlib.import_module("manikin.planning.whole_body.posture_style")
@@ -52,67 +52,6 @@ def test_an_arm_above_a_board_does_not_go_through_it(person):
     for q in found.configurations:
         _, hand = Configuration(person, q).segment_placement("left_hand")
         assert hand[2] > place[2]
-
-
-def test_postures_beside_a_wall_do_not_jump_where_the_preferred_ones_do(person):
-    """An arm is raised at once: no joint of the guide is faster than it may turn, and clearances are kept."""
-    hanging, raised = READY.posture(person), READY.posture(person)
-    raised[7 + person.joint_index("left_shoulder_abduction")] = np.radians(100.0)
-    wall = Obstacle("wall", Box((0.1, 2.0, 2.0)), translation=(0.45, 0.0, 1.0))
-    found = guide(person, Scene([wall]), [hanging] * 3 + [raised] * 4)
-    assert found.failures == ()
-    steps = np.abs(np.diff(found.configurations, axis=0))[:, 7:] / np.diff(found.time)[:, None]
-    assert np.all(steps <= person.velocity_limit * (1.0 + 1e-9))
-    soles = {(f"{side}_{part}", "floor") for side in ("left", "right") for part in ("foot", "toes")}
-    nearest = Proximity(person, Scene([wall])).minimum_over(found.configurations, frozenset(soles))
-    assert nearest.distance > NEAR * 0.028 - 2e-3  # with the tolerance of the search
-
-
-def test_around_a_jump_the_way_that_joints_can_follow_is_taken(person):
-    """Found forward, an elbow turns by 2 rad from one posture to the next; backward, by 0.4 rad each."""
-    elbow, time = 7 + person.joint_index("left_elbow_flexion"), np.linspace(0.0, 1.0, 11)
-
-    def bent(angle):
-        q = READY.posture(person)
-        q[elbow] = angle
-        return PostureResult(True, q, 0.0, 0.0, (), 1)
-
-    ahead = [bent(0.0 if k < 8 else 2.0) for k in range(len(time))]
-    references = np.array([result.q for result in ahead])
-    path = posture_style._GuidePath(
-        person, Proximity(person, Scene()), time, (frozenset(),) * len(time), references, READY,
-        posture_style._speeds(person, ()),
-    )  # fmt: skip
-    choices = path.beside_jumps(ahead, lambda q, _: bent(max(q[elbow] - 0.4, 0.0)))
-    angles = [result.q[elbow] for result in path.shortest(choices)]
-    np.testing.assert_allclose(np.diff(angles).max(), 0.4, atol=1e-12)
-    assert (angles[0], angles[-1]) == (0.0, 2.0)
-    assert path.shortest([[result] for result in ahead]) == ahead  # nothing else to choose
-
-
-def test_no_joint_of_a_guide_is_faster_than_it_may_turn(person):
-    """A jump is passed in the time that it needs, before and after it; what is slower or exact stays."""
-    time = np.linspace(0.0, 2.0, 21)
-    postures = np.tile(READY.posture(person), (len(time), 1))
-    elbow, toe = (7 + person.joint_index(f"left_{name}") for name in ("elbow_flexion", "toe_extension"))
-    hip = 7 + person.joint_index("left_hip_flexion")
-    limit = person.velocity_limit
-    postures[:, hip] = 0.9 * limit[hip - 7] * np.abs(time - 1.0)
-    slow = Guide(time, postures, ())
-    assert slow.without_jumps(person) is slow
-
-    before, after = 0.0, 2.5 * 0.1 * limit[elbow - 7]
-    postures[:, elbow] = np.where(time < 1.0, before, after)
-    postures[:, toe] = np.where(time < 1.0, 0.0, 1.0)
-    smooth = Guide(time, postures, ()).without_jumps(person, [toe]).configurations
-    speed = np.abs(np.diff(smooth[:, elbow])) / np.diff(time)
-    assert speed.max() <= limit[elbow - 7] * (1.0 + 1e-12)
-    assert smooth[:, elbow].min() == before
-    assert smooth[:, elbow].max() == after
-    middle = 0.5 * (smooth[9, elbow] + smooth[10, elbow])
-    assert middle == pytest.approx(0.5 * (before + after))
-    others = np.delete(np.arange(person.nq), elbow)
-    np.testing.assert_allclose(smooth[:, others], postures[:, others], rtol=0.0, atol=1e-12)
 
 
 def test_toes_that_follow_their_roll_make_no_posture_far_from_the_one_before(person, monkeypatch):

@@ -15,7 +15,7 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
-from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.kinematics import Placement, PostureProblem, PostureResult, SolverSettings, generate_posture
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray
@@ -117,8 +117,8 @@ def find_key_postures(
         requirements: What the finished motion must keep; the clearance is asked of the postures.
         range_margin: Angle that the postures keep from the ends of the hinge ranges [rad].
         tolerance: How exact contacts and centre of mass have to be [m].
-        known: (phases + 1, nq) postures from which each search starts and to which it stays near, unless
-            feet alone carry in a more natural one; the posture before and the manner's when omitted.
+        known: (phases + 1, nq) postures from which each search starts and to which it stays near; the
+            posture before and the manner's when omitted.
         padded: Obstacles that any part of the body may lean on.
         ease: Whether postures far from the preferred ones ask for an easier centre of mass.
         similar: Those of a plan near to this one on the same contacts, from which each search starts.
@@ -127,9 +127,11 @@ def find_key_postures(
     time = schedule.instants[trajectory.binds(schedule.instants)]
     feet = ((swing.effector, foot_roll(body, schedule, swing)) for swing in schedule.sequence.swings())
     com, rolls = trajectory.position(time), [(name, roll) for name, roll in feet if roll is not None]
-    preferred = reference_motion(body, trajectory, time, manner)
-    lay_toes_flat(toe_angles(body, rolls, time), preferred)
-    references = preferred if known is None else align_quaternions(np.array(known[: len(time)]))
+    if known is None:
+        references = reference_motion(body, trajectory, time, manner)
+        lay_toes_flat(toe_angles(body, rolls, time), references)
+    else:
+        references = align_quaternions(np.array(known[: len(time)]))
     leaning, proximity = leaning_pairs(body, padded), Proximity(body, scene)
     clearance = (requirements or WholeBodyRequirements()).clearance
     settings = replace(SETTINGS, tolerance=tolerance)
@@ -148,8 +150,6 @@ def find_key_postures(
             result = generate_posture(problem, near.q, settings=replace(settings, restarts=False))
         if result is None or not result.succeeded:
             result = generate_posture(problem, q if known is None else reference, settings=settings)
-        if known is not None and all(contact.kind is ContactKind.SOLE for contact in contacts):
-            problem, result = _natural(problem, result, preferred[key], manner, settings)
         names = (*(contact.effector for contact in contacts), *placements)
         posture = KeyPosture(key, float(time[key]), max(key - 1, 0), names, com[key], result.q)
         if not result.succeeded:
@@ -197,26 +197,6 @@ def _explained(
 BEYOND = (0.01, 0.002)
 """How far a new plan is kept inside the place where a posture begins to exist, the second where no plan keeps
 the first [m]."""
-
-
-def _natural(
-    problem: PostureProblem, result: PostureResult, preferred: FloatArray, manner: PostureStyle,
-    settings: SolverSettings,
-) -> tuple[PostureProblem, PostureResult]:  # fmt: skip
-    """The posture, or a more natural one, with its problem, where it is far from the preferred one (nq,).
-
-    A posture of a contact plan may lean back as far as another one beside it bends: each keeps its contacts,
-    and no body gets from one to the other. Sought anew, all of them stay near to one and the same manner.
-    """
-    strain = manner.strain(problem.body, preferred, result.q)
-    if result.succeeded and strain < FAR:
-        return problem, result
-    other = replace(problem, reference=preferred)
-    found = generate_posture(other, settings=settings)
-    if found.succeeded and result.succeeded and manner.strain(problem.body, preferred, found.q) >= strain:
-        return problem, result
-    return (other, found) if found.succeeded or not result.succeeded else (problem, result)
-
 
 EASIER_WEIGHT, EASIER, LITTLE_LONGER = 200.0, 0.7, 1.1
 """Weight of the planned centre of mass where an easier posture is sought [1/m^2]; share of the distance from

@@ -5,7 +5,7 @@ posture on the contacts, the swings and the centre of mass.  Like the key postur
 tell, before the motion is fitted, whether it can be done, and they are what the fitted motion stays near.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from operator import itemgetter
@@ -13,7 +13,6 @@ from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from manikin.body import BodyModel
@@ -67,19 +66,6 @@ class Guide:
         rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
         return rows
 
-    def without_jumps(self, body: BodyModel, exactly: Sequence[int] = ()) -> "Guide":
-        """The same with no coordinate faster than :func:`_speeds`.
-
-        Half way between the least and the greatest function of that speed that bound it (McShane 1934): it
-        stays where no jump is near, and goes through one half as fast, from as long before it to after it.
-        """
-        speed, postures = _speeds(body, exactly), self.configurations
-        if np.all(np.abs(np.diff(postures, axis=0)) <= speed * np.diff(self.time)[:, None]):
-            return self
-        reach = np.abs(self.time[:, None] - self.time)[:, :, None] * speed
-        upper, lower = np.min(postures + reach, axis=1), np.max(postures - reach, axis=1)
-        return replace(self, configurations=0.5 * (upper + lower))
-
     def resting(self, instants: FloatArray) -> "Guide":
         """The same, smooth and without overshoot (PCHIP), at rest at some of its times [s].
 
@@ -116,7 +102,7 @@ def plan_guide(
     effectors: dict[str, EffectorTarget], com: FloatArray, ignored: tuple[Ignored, ...],
     reference: FloatArray, clearance: float, manner: "PostureStyle", exact: Sequence[int], restarts: bool,
 ) -> Guide:  # fmt: skip
-    """Find a posture at each time, each one starting from the one before, so that none is far from the next.
+    """Find a posture at each time, each one starting from the one before.
 
     Args:
         time: (k,) [s].
@@ -132,15 +118,14 @@ def plan_guide(
     crawls = any(rolls_on_point(contact) for phase in schedule.sequence for contact in phase.stance)
     preferences = manner.preferences
     creeping = replace(preferences, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
-    exactly, touched = [7 + joint for joint in exact], dict[str, FloatArray]()
+    q, exactly = reference[0], [7 + joint for joint in exact]
+    found, failures, touched = list[FloatArray](), list[tuple[float, str]](), dict[str, FloatArray]()
     settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False, restarts=restarts)
-
-    def ways_from(q: FloatArray, k: int, halfway: bool = True) -> tuple[list[PostureProblem], FloatArray]:
-        """Problems of the posture at a time beside a neighbouring one (nq,), and where the search starts."""
-        contacts, placements = _requirements(body, schedule, float(time[k]), effectors, k, q, touched)
-        # Half way to the neighbour: neighbouring postures must not jump.
+    for k, instant in enumerate(time.tolist()):
+        contacts, placements = _requirements(body, schedule, instant, effectors, k, q, touched)
+        # Half way to the posture before: neighbouring postures must not jump.
         wanted = np.array(reference[k])
-        if halfway:
+        if k > 0:
             wanted[7:] = 0.5 * (reference[k][7:] + q[7:])
             wanted[exactly] = reference[k][exactly]
         lies = crawls and rotation_from_quaternion(reference[k : k + 1, 3:7])[0, 2, 2] < LYING
@@ -154,127 +139,16 @@ def plan_guide(
         # In flight an effector need not pass exactly where its curve does: weight of its place [1/m^2].
         loose = placements | {name: replace(placements[name], position_weight=100.0) for name in flying}
         near = replace(problem, clearance=NEAR * distance)
+        ways = (problem, near, replace(near, placements=loose))[: 3 if flying else 2]
         # How far apart two postures are is not told by joints that follow the reference in any of them.
-        beside = np.array(q)
-        beside[exactly] = reference[k][exactly]
-        return [problem, near, replace(near, placements=loose)][: 3 if flying else 2], beside
-
-    def beside(q: FloatArray, k: int) -> PostureResult:
-        """The posture at a time that is nearest to a neighbouring one (nq,), or the best attempt."""
-        ways, start = ways_from(q, k)
-        ways = [replace(problem, reference=start, preferences=TIED) for problem in ways[1:]]
-        tried = [generate_posture(ways[0], start, settings=settings)]
-        if not tried[0].succeeded and len(ways) > 1:
-            tried.append(generate_posture(ways[1], start, settings=settings))
-        return min(tried, key=_missed)
-
-    q, found = reference[0], list[PostureResult]()
-    for k in range(len(time)):
-        found.append(_guide_posture(*ways_from(q, k, k > 0), settings, reference[k], manner))
-        q = found[-1].q
-    path = _GuidePath(body, proximity, np.asarray(time), ignored, reference, manner, _speeds(body, exactly))
-    found = path.shortest(path.beside_jumps(found, beside))
-    failures = tuple(
-        (instant, result.failure or "posture not found")
-        for instant, result in zip(time.tolist(), found, strict=True) if not result.succeeded
-    )  # fmt: skip
-    postures = align_quaternions(np.array([result.q for result in found]))
-    return Guide(np.asarray(time), postures, failures).without_jumps(body, exactly)
-
-
-def _missed(result: PostureResult) -> float:
-    """What a posture misses of its contacts, centre of mass and distances [m, rad]."""
-    return max(result.error, -result.clearance, 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class _GuidePath:
-    """Choice of one posture per time, of several, that a body can go through one after the other.
-
-    Attributes:
-        time: (k,) [s].
-        ignored: Pairs that may touch, per time.
-        reference: (k, nq) preferred postures.
-        speed: (nq,) largest speed of each coordinate.
-    """
-
-    body: BodyModel
-    proximity: Proximity
-    time: FloatArray
-    ignored: tuple[Ignored, ...]
-    reference: FloatArray
-    manner: "PostureStyle"
-    speed: FloatArray
-
-    def haste(self, first: PostureResult, second: PostureResult, k: int) -> float:
-        """Greatest share of a hinge's speed that it takes from a posture to the next one, that at k."""
-        within = max(float(self.time[k] - self.time[k - 1]), LEAST_TIME)
-        return float(np.max((np.abs(second.q - first.q) / self.speed)[7:], initial=0.0)) / within
-
-    def beside_jumps(
-        self, found: Sequence[PostureResult], beside: Callable[[FloatArray, int], PostureResult]
-    ) -> list[list[PostureResult]]:
-        """Other postures around each jump, from both of its sides, until they are near to those found.
-
-        Forward in time a trunk or an arm may be led to where there is no way on. Backwards it is led from
-        where it has to come to.
-        """
-        choices = [[result] for result in found]
-        for jump in range(1, len(found)):
-            if self.haste(found[jump - 1], found[jump], jump) <= 1.0:
-                continue
-            for step, k, from_ in ((-1, jump - 1, found[jump]), (1, jump, found[jump - 1])):
-                while 0 < k < len(found) - 1 and abs(self.time[k] - self.time[jump]) < LONGEST_WAY:
-                    other = beside(from_.q, k)
-                    known = min(self.manner.strain(self.body, item.q, other.q) for item in choices[k])
-                    if known < ALIKE or _missed(other) > MOST_MISSED:
-                        break
-                    choices[k].append(other)
-                    from_, k = other, k + step
-        return choices
-
-    def shortest(self, choices: Sequence[Sequence[PostureResult]]) -> list[PostureResult]:
-        """The postures, one per time, of least cost: of themselves and of the ways between them."""
-        total, before = np.array([self._cost(0, item) for item in choices[0]]), list[NDArray[np.int64]]()
-        for k in range(1, len(choices)):
-            ways = np.zeros((len(choices[k]), len(choices[k - 1])))
-            if ways.size > 1:
-                ways += [[self._way(k, first, second) for first in choices[k - 1]] for second in choices[k]]
-            costs = ways + total
-            before.append(costs.argmin(axis=1))
-            total = costs.min(axis=1) + [self._cost(k, item) for item in choices[k]]
-        chosen = [int(np.argmin(total))]
-        for origin in reversed(before):
-            chosen.append(int(origin[chosen[-1]]))
-        return [items[one] for items, one in zip(choices, reversed(chosen), strict=True)]
-
-    def _cost(self, k: int, result: PostureResult) -> float:
-        strain = self.manner.strain(self.body, self.reference[k], result.q)
-        return 0.1 * strain / FAR + min(_missed(result) / 2.0e-3, 10.0)
-
-    def _way(self, k: int, first: PostureResult, second: PostureResult) -> float:
-        """Cost of the way from a posture to the next one, that at k; more through anything."""
-        haste = self.haste(first, second, k)
-        if haste < 0.25:
-            return 4.0 * haste**2
-        between = np.array([interpolate(self.body, first.q, second.q, share) for share in BETWEEN])
-        depth = self.proximity.minimum_over(between, self.ignored[k]).distance
-        return 4.0 * haste**2 + 10.0 * (depth < -THROUGH)
-
-
-LONGEST_WAY, LEAST_TIME = 0.8, 0.05
-"""Time from a jump in which another way to it is sought, and least time in which postures that are closer in
-time are taken to be passed [s]; our choice."""
-
-ALIKE, MOST_MISSED = 0.5, 0.05
-"""Distance of postures, in scales of the manner, below which they are one; what another posture may miss of
-its contacts, centre of mass and distances [m]."""
-
-TIED = Preferences(hinge=0.3, hinges=MappingProxyType({}), pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
-"""Of a posture that keeps near to another one, all hinges alike."""
-
-BETWEEN = (0.25, 0.5, 0.75)
-"""Shares of the way between neighbouring postures at which distances are measured."""
+        before = np.array(q)
+        before[exactly] = reference[k][exactly]
+        result = _guide_posture(ways, before, settings, reference[k], manner)
+        if not result.succeeded:
+            failures.append((instant, result.failure or "posture not found"))
+        q = result.q
+        found.append(q)
+    return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))
 
 
 def _guide_posture(
@@ -287,10 +161,10 @@ def _guide_posture(
     that is bent the next one is found bent, whether it has to be or not. No part of the body goes through
     anything on the way from the posture before, if that can be had.
     """
-    body = ways[0].body
+    body, shares = ways[0].body, np.linspace(0.0, 1.0, 5)[1:-1]
 
     def order(result: PostureResult) -> tuple[bool, bool, float]:
-        between = np.array([interpolate(body, before, result.q, share) for share in BETWEEN])
+        between = np.array([interpolate(body, before, result.q, share) for share in shares])
         assert ways[0].proximity is not None
         depth = ways[0].proximity.minimum_over(between, ways[0].ignore).distance
         apart = sum(manner.strain(body, near, result.q) for near in (preferred, before))
@@ -303,18 +177,6 @@ def _guide_posture(
         if found[-1][0] < (False, False, FAR + NEXT):
             return result
     return min(found, key=itemgetter(0))[1]
-
-
-PELVIS_SPEED, ANY = (2.0,) * 3 + (2.5,) * 4, 1.0e9
-"""Largest speed of the pelvis in a guide [m/s], and of its quaternion's parts, half of 5 rad/s [1/s]; our
-choice. Speed of what may have any."""
-
-
-def _speeds(body: BodyModel, exactly: Sequence[int]) -> FloatArray:
-    """(nq,) largest speed of each coordinate in a guide [m/s, rad/s]; any of some that are given."""
-    speed = np.concatenate([PELVIS_SPEED, body.velocity_limit])
-    speed[list(exactly)] = ANY
-    return speed
 
 
 FAR, NEXT, THROUGH = 3.0, 1.0, 5.0e-3
