@@ -281,7 +281,7 @@ class _Run:
     def _report(self, wall: float, control: float) -> Execution:
         recorder, world, fell = self.recorder, self.world, self.failure.startswith("fell")
         shift = self.controller.shift
-        moved = 0.0 if shift is None else float(np.hypot(*shift.body))
+        moved = 0.0 if shift is None else math.hypot(shift.body[0], shift.body[1])
         # An arm that swings in a recovery may brush the body.
         pushed = min((push.start for push in self.pushes), default=np.inf)
         segments = {segment.name for segment in self.body.segments}
