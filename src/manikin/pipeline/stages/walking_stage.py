@@ -183,7 +183,7 @@ def plan_walks(
         with scenario.refusing(key):
             return walking.walking_route(
                 begin, stops, objective, obstacles=obstacles, walker=walker,
-                room=section.room_m + further,                max_speed=who.max_speed_m_s, wait=who.wait_s,
+                room=section.room_m + further, max_speed=who.max_speed_m_s, wait=who.wait_s,
             )  # fmt: skip
 
     for number, other in enumerate(section.others):

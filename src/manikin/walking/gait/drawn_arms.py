@@ -4,6 +4,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from manikin.body import BodyModel
+from manikin.body.segments import SIDES
 from manikin.numerics.signals import least_jerk
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Scene
@@ -25,7 +26,6 @@ In a person of 1.75 m they reach 0.31 m to the side and 0.1 m ahead of the pelvi
 swing."""
 
 _EVERY = 2
-_SIDES = ("left", "right")
 _ARM = ("upper_arm", "forearm", "hand")
 
 
@@ -45,8 +45,8 @@ class DrawnArms:
             time: (n,) even instants of the walk [s].
         """
         others = [item for item in scene if item.name != FLOOR]
-        self._joints = [[body.joint_index(f"{side}_{name}") for name in DRAWN_IN] for side in _SIDES]
-        self._arms = [tuple(f"{side}_{part}" for part in _ARM) for side in _SIDES]
+        self._joints = [[body.joint_index(f"{side}_{name}") for name in DRAWN_IN] for side in SIDES]
+        self._arms = [tuple(f"{side}_{part}" for part in _ARM) for side in SIDES]
         mine = {segment for arm in self._arms for segment in arm}
         rest = {segment.name for segment in body.segments} - mine
         self._ignored = frozenset((segment, item.name) for segment in rest for item in others)
