@@ -5,6 +5,7 @@ from manikin.control.settings import (
     ControlSettings,
     ReturnSettings,
     ShiftSettings,
+    SoleRoom,
     SupportSettings,
     TaskWeights,
 )
@@ -13,5 +14,5 @@ from manikin.control.tasks import ForceWish
 
 __all__ = [
     "ControlOutput", "ControlSettings", "Controller", "ForceWish", "ReturnSettings", "ShiftSettings",
-    "SupportMode", "SupportSettings", "TaskWeights",
+    "SoleRoom", "SupportMode", "SupportSettings", "TaskWeights",
 ]  # fmt: skip

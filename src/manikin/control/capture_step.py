@@ -1,4 +1,4 @@
-"""Capture steps of a pushed walker: its plan goes on beside where it was, from the next step on.
+"""Capture steps of a pushed walker: its plan goes on beside where it was and comes back in further steps.
 
 A body on one foot that was pushed off its plan cannot be brought back over a stiff distance: its foot is too
 small. The deviation ``x`` of its centre of mass is taken over by the plan instead, and goes on as that of a
@@ -9,14 +9,16 @@ x' / w`` of the deviation is where
 ``landing = p + (x + x' / w - p) exp(w t)``
 
 after the remaining time ``t``. The landing foot is moved there, and a little further, since it takes the load
-gradually; from then on the deviation decays, and the rest of the plan goes on beside where it was. How far a
-foot may be moved is bounded by the other one, and near its landing it is not moved any more: what is left is
-caught by the next step. The law for a point mass is that of Koolen et al. (2012); that the plan takes over
+gradually; from then on the deviation decays. On each foot that follows, the pressure leads the body back to
+where it was planned, as far as a foot allows. How far a landing may be moved is bounded by the other foot and
+by what stands on the floor, and near its landing a foot is not moved any more: what is left is caught by the
+next step. The law for a point mass is that of Koolen et al. (2012); that the plan takes over
 the deviation is our own.
 """
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,10 +30,50 @@ from manikin.control.supports import SupportInterval, SupportMode, SupportState,
 from manikin.numerics.spatial import GRAVITY, FloatArray
 
 CATCHES = 1.3
-"""Pressure is moved by this share of a deviation of the capture point; from 1 on a small one decays."""
+"""Pressure is moved by this share of a deviation ``x`` of the capture point, as far as a foot allows; beyond
+1 a small one decays with ``(share - 1) w``."""
+
+TRIED = 6
+"""Places on the way from where a foot is to be moved to where it is, of which the first that is clear of
+obstacles is taken."""
 
 SETTLING = 4.0
 """Rate at which the deviation of a body that makes no more steps goes back [1/s]."""
+
+
+class _Landing(NamedTuple):
+    """Where a flying foot is to be moved.
+
+    Attributes:
+        target: (2,) offset at the landing [m].
+        time: Of the landing [s].
+        passes: When it passes the standing foot [s].
+        outward: (2,) level unit vector away from the standing foot.
+        beside: (2,) offset of that foot, or what obstacles leave of it: the flying one passes it no nearer
+            than planned [m].
+        soonest: Least time for the way outward [s].
+    """
+
+    target: FloatArray
+    time: float
+    passes: float
+    outward: FloatArray
+    beside: FloatArray
+    soonest: float
+
+    def pull(self, time: float, offset: FloatArray, rate: FloatArray, least: float) -> FloatArray:
+        """(2,) acceleration of an offset (2,) [m] with a rate (2,) [m/s] that goes there as a cubic of time.
+
+        ``least`` is the least time that is left [s].
+        """
+        bend = _cubic(self.target - offset, rate, max(self.time - time, least))
+        if time >= self.passes:
+            return bend
+        target, beside, now, speed, pull = (
+            float(vector @ self.outward) for vector in (self.target, self.beside, offset, rate, bend)
+        )
+        out = _cubic(max(target, beside) - now, speed, max(self.passes - time, self.soonest))
+        return bend + (out - pull) * self.outward
 
 
 class ShiftedPlan:
@@ -59,7 +101,7 @@ class ShiftedPlan:
         self.body, self._speed, self._pull = np.zeros(2), np.zeros(2), np.zeros(2)
         self._rate = {name: np.zeros(2) for name in names}
         self._bend = {name: np.zeros(2) for name in names}
-        self._target: dict[str, FloatArray] = {}
+        self._target: dict[str, _Landing] = {}
         self.active = False
         self._offsets = self._now()
 
@@ -118,13 +160,32 @@ class ShiftedPlan:
         caught = held_off + (off - held_off) * grown
         both = frequency * max(min(held.end, landing.start + 1.0) - landing.start, 1e-3)
         share = (1.0 - np.exp(-both)) / both
-        self._target[swing] = self._bounded(pivot + caught / share, pivot, held.contact, landing.contact)
+        target = self._bounded(pivot + caught / share, pivot, held.contact, landing.contact)
+        now = reference.effectors[swing]
+        target, beside = (self._clear(swing, each, now, landing.contact) for each in (target, pivot))
+        lifted = max(item.end for item in self._intervals[swing] if item.end <= time + self._period)
+        axes = held.contact.rotation_contact_to_world[:2, :2]
+        side = np.sign(float((landing.contact.position - held.contact.position)[:2] @ axes[:, 1])) or 1.0
+        self._target[swing] = _Landing(
+            target, landing.start, 0.5 * (lifted + landing.start), side * axes[:, 1], beside,
+            self._settings.latest,
+        )  # fmt: skip
+
+    def _clear(self, swing: str, target: FloatArray, now: EffectorReference, landing: Contact) -> FloatArray:
+        """The offset of a landing foot that keeps away from obstacles, the nearest on the way to it."""
+        room, offset = self._settings.room, self.feet[swing]
+        if room is None:
+            return target
+        offsets = target + np.linspace(0.0, 1.0, TRIED)[:, None] * (offset - target)
+        yaw = _yaw(landing.rotation_contact_to_world)
+        places = np.column_stack([landing.position[:2] + offsets, np.full(TRIED, yaw)])
+        free = room.beside(np.append(now.position[:2] + offset, _yaw(now.rotation)), places)
+        return offsets[np.argmax(free >= min(self._settings.nearest, free[-1]))]
 
     def _held_off(self, pivot: FloatArray, frequency: float) -> FloatArray:
         """(2,) how far the pressure under the standing foot is moved against a deviation [m]."""
-        off = self.body + self._speed / frequency - pivot
-        size = float(np.linalg.norm(off))
-        return min(CATCHES, self._settings.ankle / max(size, 1e-9)) * off
+        off = CATCHES * (self.body + self._speed / frequency) - pivot
+        return off * min(1.0, self._settings.ankle / max(float(np.linalg.norm(off)), 1e-9))
 
     def _bounded(
         self, target: FloatArray, pivot: FloatArray, stance: Contact, landing: Contact
@@ -143,13 +204,11 @@ class ShiftedPlan:
         """Let flying feet go on to where they are to land, at rest, as a cubic of the time."""
         step = self._period
         for name in self.feet:
-            target, landing = self._target.get(name), self._next(name, time)
             if name not in flying:
                 self._rate[name], self._bend[name] = np.zeros(2), np.zeros(2)
                 self._target.pop(name, None)
-            elif target is not None and landing is not None:
-                left = max(landing.start - time, step)
-                bend = 6.0 * (target - self.feet[name]) / left**2 - 4.0 * self._rate[name] / left
+            elif (landing := self._target.get(name)) is not None:
+                bend = landing.pull(time, self.feet[name], self._rate[name], step)
                 self._bend[name] = bend
                 self.feet[name] = self.feet[name] + step * self._rate[name] + 0.5 * step**2 * bend
                 self._rate[name] = self._rate[name] + step * bend
@@ -214,6 +273,15 @@ class ShiftedPlan:
             com_velocity=_plus(reference.com_velocity, body[1]),
             com_acceleration=_plus(reference.com_acceleration, body[2]), effectors=effectors,
         )  # fmt: skip
+
+
+def _cubic(way: FloatArray | float, rate: FloatArray | float, left: float) -> FloatArray:
+    """Acceleration at the beginning of a cubic that goes a way and is at rest after a time [s]."""
+    return np.asarray(6.0 * way / left**2 - 4.0 * rate / left)
+
+
+def _yaw(rotation: FloatArray) -> float:
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
 
 
 def _plus(values: FloatArray, offset: FloatArray) -> FloatArray:

@@ -2,9 +2,10 @@
 
 import math
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
-from manikin.numerics.spatial import finite_number
+from manikin.numerics.spatial import FloatArray, finite_number
 
 
 @dataclass(frozen=True)
@@ -178,6 +179,17 @@ class ReturnSettings:
         return off * min(max((self.brisk - speed) / (self.brisk - self.slow), 0.0), 1.0)
 
 
+class SoleRoom(Protocol):
+    """Room of soles beside what stands on the floor."""
+
+    def beside(self, before: FloatArray, after: FloatArray) -> FloatArray:
+        """(n,) least distances of a sole that goes straight from a place (3,) to each of others (n, 3) [m].
+
+        Places are x, y [m], yaw [rad].
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class ShiftSettings:
     """When and how far the steps of a pushed walker are moved; see ``manikin.control.capture_step``.
@@ -189,6 +201,9 @@ class ShiftSettings:
         narrowest: Least distance of a moved landing from the standing foot, across that [m].
         widest: Largest such distance [m].
         longest: Largest distance along it [m].
+        nearest: Least distance of a moved sole from what stands on the floor, also on its way, unless it has
+            less unmoved [m].
+        room: Measures that distance; None where nothing stands there.
     """
 
     threshold: float = 0.02
@@ -197,10 +212,13 @@ class ShiftSettings:
     narrowest: float = 0.05
     widest: float = 0.5
     longest: float = 0.8
+    nearest: float = 0.03
+    room: SoleRoom | None = None
 
     def __post_init__(self) -> None:
         for name in ("threshold", "ankle", "latest", "widest", "longest"):
             finite_number(getattr(self, name), f"shift setting {name!r}", above=0.0)
+        finite_number(self.nearest, "shift setting 'nearest'", at_least=0.0)
         finite_number(self.narrowest, "shift setting 'narrowest'", at_least=0.0, at_most=self.widest)
 
 

@@ -307,7 +307,7 @@ class _Run:
             realtime_factor=len(recorder.samples) * self.period / wall, wall_s=wall,
             control_ms=1e3 * control / len(recorder.samples), touches=world.touches, counted_touches=touches,
             fallbacks=tuple(fallbacks), max_slip_m=recorder.max_slip(), friction=recorder.friction_use(),
-            push=push_outcome(self.pushes, recorder, self.failure, moved),
+            push=push_outcome(self.pushes, recorder, self.failure), moved_m=moved,
             schedule=recorder.delayed_schedule(), final_foot_error_m=recorder.last_effector_error(),
         )  # fmt: skip
 

@@ -17,6 +17,9 @@ from manikin.simulation.recorder import Recorder
 BACK = 0.02
 """A body whose centre of mass stays within this of its plan, to the end, is back on it [m]."""
 
+ARRIVED = 0.1
+"""A disturbed body arrives that ends within this of where its plan did at first [m]; our choice."""
+
 
 @dataclass(frozen=True)
 class PushOutcome:
@@ -31,7 +34,6 @@ class PushOutcome:
         return_s: From the first push until the CoM is within :data:`BACK` of its plan for good [s], or None.
         waited_s: How long the plan waited for the body [s].
         max_foot_deviation_m: Largest distance of an effector from its plan at the end [m].
-        moved_m: How far the plan of a walk was moved by the end, by steps that caught the body [m].
     """
 
     impulse_Ns: float
@@ -42,16 +44,10 @@ class PushOutcome:
     return_s: float | None
     waited_s: float
     max_foot_deviation_m: float
-    moved_m: float = 0.0
 
 
-def push_outcome(
-    pushes: Sequence[Push], recorder: Recorder, failure: str, moved: float = 0.0
-) -> PushOutcome | None:
-    """Outcome of the pushes of a recorded execution, None without one; ``failure`` is empty for a success.
-
-    ``moved`` is how far its plan was moved [m].
-    """
+def push_outcome(pushes: Sequence[Push], recorder: Recorder, failure: str) -> PushOutcome | None:
+    """Outcome of the pushes of a recorded execution, None without one; ``failure`` is empty for a success."""
     if not pushes:
         return None
     first = min(pushes, key=lambda push: push.start)
@@ -65,7 +61,7 @@ def push_outcome(
         direction_deg=float(np.degrees(np.arctan2(first.force[1], first.force[0]))), at_s=first.start,
         recovered=back is not None, max_deviation_m=float(errors[since >= -1e-9].max(initial=0.0)),
         return_s=back, waited_s=recorder.samples[-1].output.waited,
-        max_foot_deviation_m=recorder.last_effector_error(), moved_m=moved,
+        max_foot_deviation_m=recorder.last_effector_error(),
     )  # fmt: skip
 
 
@@ -105,6 +101,8 @@ class Execution(Displayed):
         min_force_at_com_N: Smallest force at the CoM that would have ended balance; None where none does [N].
         min_zmp_distance_m: Least distance of the ZMP to the edge of what carries, < 0 outside; or None [m].
         final_foot_error_m: Largest distance of an effector from its plan at the end of the hold [m].
+        moved_m: How far the plan of a walk is moved at the end by steps that caught the body; distances from
+            the plan are from the moved one [m].
     """
 
     motion: Motion
@@ -135,6 +133,7 @@ class Execution(Displayed):
     min_force_at_com_N: float | None = None
     min_zmp_distance_m: float | None = None
     final_foot_error_m: float = 0.0
+    moved_m: float = 0.0
 
     @property
     def succeeded(self) -> bool:

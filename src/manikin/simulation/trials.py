@@ -16,11 +16,9 @@ from manikin.runtime.parallel import side_by_side
 from manikin.scene import Scene
 from manikin.scene.scene import FLOOR
 from manikin.simulation.execute import execute
+from manikin.simulation.execution import ARRIVED
 from manikin.simulation.push_force import Push
 from manikin.simulation.uncertainty import Uncertainty
-
-ARRIVED = 0.1
-"""A body arrives whose centre of mass and effectors are near their plan at the end [m]; our choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +56,7 @@ class Trial:
     Attributes:
         seed: Of the world.
         stood: Whether the body neither fell nor the simulation diverged.
-        arrived: Whether it stood and came to the end of the plan, see :data:`ARRIVED`.
+        arrived: Whether it stood and came to the end of the plan, see :data:`.ARRIVED`.
         failure: What failed first; empty where the body arrived.
         failure_time_s: When [s], or None.
     """
@@ -143,7 +141,8 @@ def _tried(world: _World) -> Trial:
         phase = int(schedule.phase_at(min(time, float(schedule.instants[-1]))))
         held = ", ".join(schedule.sequence[phase].stance.effectors)
         return Trial(world.seed, False, False, f"{what} in phase {phase} on {held}", time)
-    missed = _missed(("centre of mass", result.final_com_error_m), ("effector", result.final_foot_error_m))
+    off, moved = (result.final_com_error_m, result.final_foot_error_m), result.moved_m
+    missed = _missed(("centre of mass", off[0] + moved), ("effector", off[1] + moved))
     return Trial(world.seed, True, not missed, missed, end if missed else None)
 
 

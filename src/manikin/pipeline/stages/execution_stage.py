@@ -11,7 +11,7 @@ from joblib import cpu_count
 
 from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import ContactKind, ContactSchedule, FrictionModel, StanceSequence
-from manikin.control import ControlSettings, ReturnSettings, ShiftSettings, SupportSettings
+from manikin.control import ControlSettings, ReturnSettings, ShiftSettings, SoleRoom, SupportSettings
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, StageFailure, place
 from manikin.planning import push_pull
@@ -19,7 +19,7 @@ from manikin.planning.push_pull import Act, ActKind, BracedForces, PlannedAct
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.simulation import Execution, Push, execute, push_on_the_way
-from manikin.simulation.execution import BACK
+from manikin.simulation.execution import ARRIVED, BACK
 from manikin.simulation.trials import TrialTask, run_trials
 from manikin.simulation.uncertainty import Uncertainty
 
@@ -57,8 +57,10 @@ class ExecutionRequirements:
             seated: Whether it ends on a seat.
             walked: Time until which it walks [s].
         """
-        pushed = execution.push is not None
-        rest = self._returned(execution) if pushed else self._followed(execution, seated, walked)
+        if execution.push is not None:
+            rest = self._returned(execution, walked > -np.inf)
+        else:
+            rest = self._followed(execution, seated, walked)
         return requirement_table([*_kept_standing(execution), *rest])
 
     def _followed(self, execution: Execution, seated: bool, walked: float) -> list[Requirement | None]:
@@ -89,8 +91,8 @@ class ExecutionRequirements:
                         float(motion.time[~walks][np.argmin(after)])) if after.size else None,
         ]  # fmt: skip
 
-    def _returned(self, execution: Execution) -> list[Requirement | None]:
-        """Requirements of a body that was pushed: it has to come back to its plan."""
+    def _returned(self, execution: Execution, walks: bool) -> list[Requirement | None]:
+        """Requirements of a body that was pushed: it has to come back to its plan, and a walk to its end."""
         push, end = execution.push, float(execution.motion.time[-1])
         if push is None:
             return []
@@ -99,6 +101,8 @@ class ExecutionRequirements:
                         execution.final_com_error_m, "<=", BACK, end),
             Requirement("max_foot_deviation_m", "distance of an effector from its plan at the end", "m",
                         push.max_foot_deviation_m, "<=", self.foot_error, end),
+            Requirement("moved_m", "distance of the end of the walk from where it was planned", "m",
+                        execution.moved_m, "<=", ARRIVED, end) if walks else None,
         ]  # fmt: skip
 
 
@@ -119,12 +123,14 @@ class PlannedMotion:
 
     Attributes:
         walked: Time until which it walks on rolling feet [s]; before all times where it does not.
+        room: Measures the room of soles beside what stands on the floor; None where nothing does.
     """
 
     schedule: ContactSchedule
     motion: Motion
     act: PlannedAct | None = None
     walked: float = -np.inf
+    room: SoleRoom | None = None
 
     @property
     def end(self) -> float:
@@ -137,7 +143,7 @@ class PlannedMotion:
         instants = np.concatenate([self.schedule.instants, schedule.instants[1:] + delay])
         phases = StanceSequence([*self.schedule.sequence, *schedule.sequence])
         joined = ContactSchedule(phases, instants), self.motion.then(after.motion)
-        return PlannedMotion(*joined, after.act, self.walked)
+        return PlannedMotion(*joined, after.act, self.walked, self.room)
 
 
 FORCE_ERROR = 0.05
@@ -236,10 +242,12 @@ def execute_motion(
     scenario, act = context.scenario, planned.act
     # The share of the friction that planning keeps to, where it has its own, holds in control too.
     supports = SupportSettings(friction_share=scenario.friction_share)
-    returning = None if scenario.file.push is None else ReturnSettings()
-    walks = scenario.file.push is not None and scenario.file.walking is not None
-    stepping = ShiftSettings() if walks else None
-    settings = ControlSettings(supports=supports, returning=returning, stepping=stepping)
+    # What follows a walk is where it is, and no plan of steps.
+    stepping = ShiftSettings(room=planned.room) if planned.walked >= planned.end else None
+    settings = ControlSettings(supports=supports)
+    disturbed = replace(settings, returning=ReturnSettings(), stepping=stepping)
+    if scenario.file.push is not None:
+        settings = disturbed
     pushes, wishes = _pushes(scenario, planned.motion), () if act is None else tuple(act.wishes)
     result = execute(
         context.body, context.scene, planned.motion, planned.schedule,
@@ -264,9 +272,8 @@ def execute_motion(
         report.fail(failure.stage, failure.reason, failure.time_s, failure.where)
     report.keep_motions(planned.schedule, planned.motion, result.motion)
     if failure is None and scenario.file.execution.trials > 0:
-        ready = replace(settings, returning=ReturnSettings())
         task = TrialTask(
-            context.body, context.scene, planned.motion, planned.schedule, ready, tuple(context.padded),
+            context.body, context.scene, planned.motion, planned.schedule, disturbed, tuple(context.padded),
             wishes, pushes,
         )  # fmt: skip
         report.finish("trials", _trials(scenario, task, report))

@@ -29,6 +29,7 @@ from manikin.scenarios.world import flat_sequence
 from manikin.scene import Scene
 from manikin.scene.distance import Proximity, segment_of
 from manikin.simulation import Execution
+from manikin.walking.foot_room import FootRoom
 from manikin.walking.footprints import FEET, Footprints
 from manikin.walking.gait.balanced_walk import BalancedWalk, balanced_walk
 from manikin.walking.path.walk_obstacles import in_the_way
@@ -61,15 +62,15 @@ class ExecutedWalk:
 
 def walk_in_balance(context: RunContext, report: Report, requirements: ExecutionRequirements) -> ExecutedWalk:
     """Find the way of a walking scenario, walk it on people's footprints in balance, and execute that."""
-    walk = _walked(context, report, lambda further: (plan_walks(context, further=further), None))
-    if walk is None:
+    found = _walked(context, report, lambda further: (plan_walks(context, further=further), None))
+    if found is None:
         return ExecutedWalk()
+    walk = found.walk
     report.keep_motions(walk.schedule, walk.motion)
     report.planned = report.failure is None
     if report.failure is not None or not context.scenario.execution_required:
         return ExecutedWalk(walk.motion)
-    planned = PlannedMotion(walk.schedule, walk.motion, walked=float(walk.motion.time[-1]))
-    execution = execute_motion(context, report, planned, requirements)
+    execution = execute_motion(context, report, found.planned, requirements)
     report.judge()
     return ExecutedWalk(walk.motion, execution)
 
@@ -101,13 +102,13 @@ def walk_before(context: RunContext, report: Report, planned: PlannedMotion) -> 
     """
     if context.scenario.file.walking is None or report.failure is not None:
         return planned
-    walk = _walked(context, report, partial(way_before, context), planned.motion.q[0])
-    if walk is None or report.failure is not None:
+    found = _walked(context, report, partial(way_before, context), planned.motion.q[0])
+    if found is None or report.failure is not None:
         report.planned = False
         return planned
     for stage in ("centroidal", "wholebody"):
-        report.require(stage, report.table(stage).later(walk.motion.duration))
-    whole = PlannedMotion(walk.schedule, walk.motion, walked=float(walk.motion.time[-1])).then(planned)
+        report.require(stage, report.table(stage).later(found.walk.motion.duration))
+    whole = found.planned.then(planned)
     report.keep_motions(whole.schedule, whole.motion)
     return whole
 
@@ -120,6 +121,13 @@ class _TriedWalk:
     stepped: SteppedPath
     walk: BalancedWalk
     beside: Requirement | None
+    room: FootRoom
+
+    @property
+    def planned(self) -> PlannedMotion:
+        """The walk, ready to be executed."""
+        motion = self.walk.motion
+        return PlannedMotion(self.walk.schedule, motion, walked=float(motion.time[-1]), room=self.room)
 
     @property
     def lack(self) -> float:
@@ -131,7 +139,7 @@ def _walked(
     context: RunContext, report: Report,
     find: Callable[[float], tuple[PlannedWalks, Mapping[str, FloatArray] | None]],
     last: FloatArray | None = None,
-) -> BalancedWalk | None:  # fmt: skip
+) -> _TriedWalk | None:  # fmt: skip
     """The walk in balance on a way, reported; None where there is none.
 
     A walk that comes too near to something is tried again on ways with so much more room, while there are
@@ -161,7 +169,7 @@ def _walked(
     keep_paths(report, best.plan, best.stepped)
     _report(context, report, best)
     walk_others(context, report, best.plan)
-    return best.walk
+    return best
 
 
 def _attempt(
@@ -173,7 +181,8 @@ def _attempt(
         others = Scene(in_the_way(context.scene, context.body.stature or 2.0), None)
         stepped = walking.step_along(plan.route, rule, ends=ends, height=height, obstacles=plan.obstacles)
         walk = balanced_walk(context.body, stepped, friction=FRICTION, end=last, scene=others)
-    return _TriedWalk(plan, stepped, walk, _clearance(walk, others))
+    room = FootRoom(plan.obstacles, rule.sole_length, rule.sole_width)
+    return _TriedWalk(plan, stepped, walk, _clearance(walk, others), room)
 
 
 def _report(context: RunContext, report: Report, attempt: _TriedWalk) -> None:
