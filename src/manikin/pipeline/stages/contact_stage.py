@@ -194,6 +194,9 @@ RUNG_STRIDES = 2.2
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
+RESTED = 0.5
+"""Share of the stages of a walk with rests up to which further ones are tried, before it rests at all."""
+
 
 class _LimbSearch(_ContactSearch):
     """Search for contacts of the limbs that a scenario names, all limbs where it names none."""
@@ -407,9 +410,9 @@ def _passed(report: Report, context: RunContext, passing: Passing) -> RunContext
 def slower(context: RunContext, report: Report, stage: int | None) -> RunContext | None:
     """The walk after a failure: with more time, then with rests around the stage of it, then everywhere.
 
-    A plan of the centre of mass that fails has rests there at once, and one that fails again has them
-    everywhere. A posture that is missing on feet that roll is sought on flat ones before. None where the body
-    rests at all changes, and after a success.
+    A plan of the centre of mass that fails has rests there at once, and one that fails again somewhere else
+    has them there, too, up to :data:`RESTED` of the stages. A posture that is missing on feet that roll is
+    sought on flat ones before. None where the body rests at all changes, and after a success.
     """
     passing, failure = context.passing, report.failure
     if failure is None or passing is None:
@@ -419,7 +422,10 @@ def slower(context: RunContext, report: Report, stage: int | None) -> RunContext
     paces, walking = passing.paces, None
     if moved and Pace.PASSING in paces:
         paces = tuple(max(pace, Pace.UNHURRIED) for pace in paces)
-    elif (moved or unplanned) and stage is not None and Pace.RESTING not in paces:
+    elif stage is not None and (
+        (moved and Pace.RESTING not in paces)
+        or (unplanned and paces.count(Pace.RESTING) <= RESTED * len(paces))
+    ):
         there = range(stage - 1, stage + 2)
         paces = tuple(Pace.RESTING if k in there else pace for k, pace in enumerate(paces))
     if paces != passing.paces:
