@@ -12,6 +12,7 @@ from manikin.pipeline.runner import run
 from manikin.pipeline.stages import ExecutionRequirements
 from manikin.scenarios import load_scenario
 from manikin.scene import Proximity, Scene
+from manikin.simulation.execution import PushOutcome
 
 KEYS = {
     "centroidal": {
@@ -207,3 +208,17 @@ def test_only_a_walk_may_be_out_of_balance_for_some_control_steps(platform):
     assert broken(more, end) == "margin_share"
     assert broken(few, half) is None
     assert broken(last, half) == "min_margin"
+
+
+@pytest.mark.slow
+def test_a_pushed_walk_has_to_end_where_it_was_planned(platform):
+    """Steps that catch a body move its walk: by 10 cm at most; what was not walking has no such end."""
+    outcome = PushOutcome(15.0, 0.0, 1.0, True, 0.2, 2.0, 0.0, 0.01)
+    table, end = ExecutionRequirements().table, float(platform.execution.motion.time[-1])
+    near, far = (
+        replace(platform.execution, push=outcome, final_com_error_m=0.0, moved_m=moved)
+        for moved in (0.09, 0.11)
+    )
+    assert table(near, walked=end).first_broken is None
+    assert table(far, walked=end).first_broken.key == "moved_m"
+    assert "moved_m" not in {row.key for row in table(far)}
