@@ -102,7 +102,7 @@ class ShiftedPlan:
         self._rate = {name: np.zeros(2) for name in names}
         self._bend = {name: np.zeros(2) for name in names}
         self._target: dict[str, _Landing] = {}
-        self.active = False
+        self.active, self._off = False, np.zeros((2, 2))
         self._offsets = self._now()
 
     def moved(
@@ -120,6 +120,10 @@ class ShiftedPlan:
         """
         if not self._walks:
             return reference
+        off = state.com[:2] - reference.com[:2] - self.body
+        rate = (state.momentum[:3] / state.mass - reference.com_velocity)[:2] - self._speed
+        now = self._period / (self._settings.filtering + self._period)
+        self._off += now * (np.array([off, rate]) - self._off)
         standing = [name for name, item in supports.items() if item.mode is SupportMode.STANCE]
         flying = [name for name, item in supports.items() if item.mode is SupportMode.SWING]
         if len(standing) == len(flying) == 1:
@@ -131,8 +135,8 @@ class ShiftedPlan:
         self._move_feet(time, flying)
         rests = waits or (self._next_of_all(time) is None and len(standing) == len(self.feet))
         pivot, frequency = self._pivot(time, standing), self._frequency(state, reference)
-        if len(standing) == 1:
-            pivot = pivot + self._held_off(pivot, frequency)
+        if len(standing) == 1 and (held := self._held(standing[0], time)) is not None:
+            pivot = pivot + self._held_off(pivot, frequency, _axes(held.contact))
         self._move_body(pivot, frequency, rests=rests)
         return shifted
 
@@ -148,15 +152,16 @@ class ShiftedPlan:
         if landing is None or landing.start - time < self._settings.latest:
             return
         frequency, pivot = self._frequency(state, reference), self.feet[stance]
-        off = state.com[:2] - reference.com[:2] - self.body
-        rate = (state.momentum[:3] / state.mass - reference.com_velocity)[:2] - self._speed
+        off, rate = self._off
         if np.linalg.norm(off + rate / frequency) > self._settings.threshold:
             self.body, self._speed, self.active = self.body + off, self._speed + rate, True
+            self._off = np.zeros((2, 2))
         if not self.active:
             return
         held = next(item for item in self._intervals[stance] if item.start <= time < item.end)
         grown = np.exp(frequency * (landing.start - time))
-        off, held_off = self.body + self._speed / frequency - pivot, self._held_off(pivot, frequency)
+        off = self.body + self._speed / frequency - pivot
+        held_off = self._held_off(pivot, frequency, _axes(held.contact))
         caught = held_off + (off - held_off) * grown
         both = frequency * max(min(held.end, landing.start + 1.0) - landing.start, 1e-3)
         share = (1.0 - np.exp(-both)) / both
@@ -164,7 +169,7 @@ class ShiftedPlan:
         now = reference.effectors[swing]
         target, beside = (self._clear(swing, each, now, landing.contact) for each in (target, pivot))
         lifted = max(item.end for item in self._intervals[swing] if item.end <= time + self._period)
-        axes = held.contact.rotation_contact_to_world[:2, :2]
+        axes = _axes(held.contact)
         side = np.sign(float((landing.contact.position - held.contact.position)[:2] @ axes[:, 1])) or 1.0
         self._target[swing] = _Landing(
             target, landing.start, 0.5 * (lifted + landing.start), side * axes[:, 1], beside,
@@ -182,17 +187,18 @@ class ShiftedPlan:
         free = room.beside(np.append(now.position[:2] + offset, _yaw(now.rotation)), places)
         return offsets[np.argmax(free >= min(self._settings.nearest, free[-1]))]
 
-    def _held_off(self, pivot: FloatArray, frequency: float) -> FloatArray:
-        """(2,) how far the pressure under the standing foot is moved against a deviation [m]."""
-        off = CATCHES * (self.body + self._speed / frequency) - pivot
-        return off * min(1.0, self._settings.ankle / max(float(np.linalg.norm(off)), 1e-9))
+    def _held_off(self, pivot: FloatArray, frequency: float, axes: FloatArray) -> FloatArray:
+        """(2,) how far the pressure under a standing foot with axes (2, 2) is moved against the deviation."""
+        off = (CATCHES * (self.body + self._speed / frequency) - pivot) @ axes
+        most = np.array([self._settings.ankle, self._settings.ankle_across])
+        return axes @ (off / max(1.0, float(np.max(np.abs(off) / most))))
 
     def _bounded(
         self, target: FloatArray, pivot: FloatArray, stance: Contact, landing: Contact
     ) -> FloatArray:
         """The offset of a landing foot that its distance from the standing one allows, nearest to another."""
         settings = self._settings
-        axes = stance.rotation_contact_to_world[:2, :2]
+        axes = _axes(stance)
         planned = (landing.position - stance.position)[:2]
         ahead, left = (planned + target - pivot) @ axes
         side = 1.0 if float(planned @ axes[:, 1]) >= 0.0 else -1.0
@@ -278,6 +284,11 @@ class ShiftedPlan:
 def _cubic(way: FloatArray | float, rate: FloatArray | float, left: float) -> FloatArray:
     """Acceleration at the beginning of a cubic that goes a way and is at rest after a time [s]."""
     return np.asarray(6.0 * way / left**2 - 4.0 * rate / left)
+
+
+def _axes(contact: Contact) -> FloatArray:
+    """(2, 2) level axes of a sole, forward and left, in its columns."""
+    return contact.rotation_contact_to_world[:2, :2]
 
 
 def _yaw(rotation: FloatArray) -> float:

@@ -196,7 +196,9 @@ class ShiftSettings:
 
     Attributes:
         threshold: Deviation of the capture point, on one foot, from which the plan takes it over [m].
-        ankle: How far the pressure under the standing foot is moved against the deviation at most [m].
+        filtering: Time constant with which that deviation is smoothed [s]: landings and noise pass.
+        ankle: How far the pressure under the standing foot is moved along it against that at most [m].
+        ankle_across: The same across it [m].
         latest: A foot is not moved later than this before its landing [s].
         narrowest: Least distance of a moved landing from the standing foot, across that [m].
         widest: Largest such distance [m].
@@ -206,8 +208,10 @@ class ShiftSettings:
         room: Measures that distance; None where nothing stands there.
     """
 
-    threshold: float = 0.02
-    ankle: float = 0.03
+    threshold: float = 0.035
+    filtering: float = 0.03
+    ankle: float = 0.05
+    ankle_across: float = 0.03
     latest: float = 0.08
     narrowest: float = 0.05
     widest: float = 0.5
@@ -216,7 +220,7 @@ class ShiftSettings:
     room: SoleRoom | None = None
 
     def __post_init__(self) -> None:
-        for name in ("threshold", "ankle", "latest", "widest", "longest"):
+        for name in ("threshold", "filtering", "ankle", "ankle_across", "latest", "widest", "longest"):
             finite_number(getattr(self, name), f"shift setting {name!r}", above=0.0)
         finite_number(self.nearest, "shift setting 'nearest'", at_least=0.0)
         finite_number(self.narrowest, "shift setting 'narrowest'", at_least=0.0, at_most=self.widest)
