@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from manikin.contact import (
     CarriedLoad,
     ContactSchedule,
+    ExertedForce,
     Phase,
     Stance,
     StanceSequence,
@@ -104,10 +105,11 @@ def test_swings_and_their_intervals_follow_from_the_sequence():
 
 
 def test_a_schedule_seen_from_another_frame_keeps_its_contacts_apart_or_one():
-    """A foot that stands on in the next phase stays one contact; points, times and the load follow."""
+    """A foot that stands on in the next phase stays one contact; points, times, load and force follow."""
     left, right = sole("left_foot", (0.0, 0.1, 0.0), **SIZE), sole("right_foot", (0.4, -0.1, 0.0), **SIZE)
     load = CarriedLoad({"left_hand": 3.0}, np.array([0.3, 0.0, 0.1]))
-    phases = [Phase(Stance([left])), Phase(Stance([left, right]), load=load)]
+    force = ExertedForce("push", np.array([1.0, 0.0, 0.0]))
+    phases = [Phase(Stance([left])), Phase(Stance([left, right]), load=load, exerts=force)]
     schedule = ContactSchedule(StanceSequence(phases), [1.0, 1.5, 2.25])
     transform = PlanarTransform(10.0, -2.0, 90.0)
     moved = schedule.moved(transform)
@@ -118,5 +120,8 @@ def test_a_schedule_seen_from_another_frame_keeps_its_contacts_apart_or_one():
             after.points_in_world, transform.points(before.points_in_world), atol=1e-12
         )
     np.testing.assert_allclose(second.load.offset, [0.0, 0.3, 0.1], atol=1e-15)
+    assert first.exerts is None
+    assert second.exerts.kind == "push"
+    np.testing.assert_allclose(second.exerts.direction, [0.0, 1.0, 0.0], atol=1e-15)
     assert moved.duration == schedule.duration == 1.25
     assert schedule.moved(PlanarTransform()) is schedule

@@ -45,10 +45,11 @@ def measured(body, q):
     ],
 )
 def test_one_hinge_is_one_angle(body, joint, angle, found):
-    others = {"left_arm_elbow": "left_arm_outward"}.get(found, "")
+    others = {"left_arm_elbow": "left_arm_outward", "neck_flexion": "head_inclination"}.get(found, "")
     result = measured(body, posture(body, **{joint: angle}))
     assert result.pop(found) == pytest.approx(angle, abs=1e-6)
     assert set(result) <= {others}
+    assert result.get("head_inclination", angle) == pytest.approx(angle, abs=1e-6)
 
 
 def test_pronation_of_either_body_is_a_twist_of_the_forearm():
@@ -68,8 +69,38 @@ def test_a_stiff_body_leans_as_it_is_turned(heading, lean):
     rotation = rotation_from_rpy(0.0, np.deg2rad(lean), heading)
     result = measured(HUMAN, turned_by(HUMAN.zero_posture(), rotation))
     assert result.pop("trunk_flexion") == pytest.approx(lean, abs=1e-6)
-    assert set(result) == {"left_arm_from_vertical", "right_arm_from_vertical"}
+    assert result.pop("head_inclination") == pytest.approx(lean, abs=1e-6)
+    assert set(result) == {
+        f"{side}_arm_{name}" for side in ("left", "right") for name in ("from_vertical", "ahead")
+    }
     assert result["left_arm_from_vertical"] == pytest.approx(abs(lean), abs=1e-6)
+    assert np.sin(np.deg2rad(result["left_arm_ahead"])) == pytest.approx(-np.sin(np.deg2rad(lean)), abs=1e-9)
+
+
+def test_a_head_is_measured_in_the_world_whatever_the_spine_does():
+    """Spine and neck add up where all bend in one plane; the line from the hips to the neck leans less."""
+    angles = postural_angles(
+        HUMAN, posture(HUMAN, lumbar_flexion=30.0, thorax_flexion=30.0, neck_flexion=-20.0)[None]
+    )
+    assert np.rad2deg(angles.head_inclination[0]) == pytest.approx(40.0, abs=1e-6)
+    assert np.rad2deg(angles.trunk_flexion[0]) < 50.0
+    upright = postural_angles(HUMAN, HUMAN.standing_posture()[None], np.deg2rad(15.0))
+    assert np.rad2deg(upright.head_inclination[0]) == pytest.approx(-15.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_an_arm_ahead_of_or_beside_its_shoulder(side):
+    """Outward is positive on both sides; a bent trunk leaves a hanging arm where it hangs."""
+    sign = 1.0 if side == "left" else -1.0
+    for wanted, ahead, beside in (((1.0, 0.0, 0.0), 90.0, 0.0), ((0.0, sign, 0.0), 0.0, 90.0),
+                                  ((-0.5, 0.0, -np.sqrt(0.75)), -30.0, 0.0)):  # fmt: skip
+        arm = postural_angles(HUMAN, arm_along(side, np.array(wanted))[None]).arms[side]
+        assert np.rad2deg(arm.ahead[0]) == pytest.approx(ahead, abs=0.05)
+        assert np.rad2deg(arm.beside[0]) == pytest.approx(beside, abs=0.05)
+    q = arm_along(side, np.array([0.5, 0.0, -np.sqrt(0.75)]))
+    q[7 + HUMAN.joint_index("thorax_flexion")] = np.deg2rad(30.0)
+    bent = postural_angles(HUMAN, q[None])
+    assert np.rad2deg(bent.arms[side].ahead[0]) == pytest.approx(0.0, abs=0.05)
 
 
 def test_a_stiff_body_that_falls_to_the_left_bends_to_the_left():

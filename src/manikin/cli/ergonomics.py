@@ -53,6 +53,16 @@ def ergonomics(
     neck: Annotated[float, option("DEG", "Flexion of the neck when it is upright.", "--neck-deg")] = 0.0,
     lifts: Annotated[float, option("N", "How often the load is lifted.", "--lifts-per-minute")] = 0.2,
     hours: Annotated[float, option("H", "For how long at a stretch.", "--lifting-hours")] = 1.0,
+    cycles: Annotated[
+        float | None,
+        option("N", "How often the motion is made, for EN 1005-3 and -4.", "--cycles-per-minute"),
+    ] = None,
+    job_hours: Annotated[
+        float | None, option("H", "For how long such motions are made at a stretch, for EN 1005-3.")
+    ] = None,
+    domestic: Annotated[
+        bool, flag("--domestic", "What is pushed or pulled is used at home, for EN 1005-3.")
+    ] = False,
     people_age: Annotated[
         float | None, option("YEARS", "Age of those who shall have the strength. Default: the body's.")
     ] = None,
@@ -83,7 +93,7 @@ def ergonomics(
     given = Circumstances(
         heaviest(body, content.schedule), load_pattern, coupling, static, repeated, rapid, raised, supported,
         neck_upright_deg=neck, lifts_per_minute=lifts, lifting_hours=hours, people_age=people_age,
-        back_lever_m=back_lever,
+        back_lever_m=back_lever, cycles_per_minute=cycles, job_hours=job_hours, domestic=domestic,
     )  # fmt: skip
     with console.stdout_kept_clean():
         result = ergonomics_of(body, motion, schedule=content.schedule, given=given, fraction=fraction)

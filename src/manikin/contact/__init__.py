@@ -19,6 +19,7 @@ from manikin.contact.contact import (
 from manikin.contact.stance import (
     CarriedLoad,
     ContactSchedule,
+    ExertedForce,
     Phase,
     Stance,
     StanceSequence,
@@ -28,7 +29,7 @@ from manikin.contact.stance import (
 
 __all__ = [
     "BODY_WEIGHTS_CAP", "FRICTION_MODELS", "CarriedLoad", "Contact", "ContactKind", "ContactModel",
-    "ContactSchedule", "FrictionModel", "Phase", "SolePart", "Stance", "StanceSequence",
-    "Swing", "default_normal_force_cap", "grasp", "point", "roll_feet", "rolling_front", "sole",
-    "sole_part", "soles_overlap",
+    "ContactSchedule", "ExertedForce", "FrictionModel", "Phase", "SolePart", "Stance",
+    "StanceSequence", "Swing", "default_normal_force_cap", "grasp", "point", "roll_feet", "rolling_front",
+    "sole", "sole_part", "soles_overlap",
 ]  # fmt: skip

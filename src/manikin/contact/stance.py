@@ -124,6 +124,19 @@ class CarriedLoad:
 
 
 @dataclass(frozen=True, eq=False)
+class ExertedForce:
+    """What the hands do to an object of the scene during a phase.
+
+    Attributes:
+        kind: ``"push"`` or ``"pull"``.
+        direction: (3,) unit, where the force on the object points, world axes.
+    """
+
+    kind: str
+    direction: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Phase:
     """A stance and how long it may last.
 
@@ -133,6 +146,7 @@ class Phase:
         max_duration: Upper bound [s], or None.
         load: What is carried during the phase and is no part of the body, or None.
         continues: Whether it is a further part of the phase before, which a rolling foot divides.
+        exerts: What the hands push or pull during the phase, or None.
     """
 
     stance: Stance
@@ -140,6 +154,7 @@ class Phase:
     max_duration: float | None = None
     load: CarriedLoad | None = None
     continues: bool = False
+    exerts: ExertedForce | None = None
 
     def __post_init__(self) -> None:
         least, most = self.min_duration, self.max_duration
@@ -263,11 +278,7 @@ class ContactSchedule(Displayed):
         if transform.is_identity:
             return self
         placed = self.with_contacts(cache(lambda contact: contact.moved(transform)))
-        phases = [
-            phase if (load := phase.load) is None
-            else replace(phase, load=replace(load, offset=transform.directions(load.offset)))
-            for phase in placed.sequence
-        ]  # fmt: skip
+        phases = [_turned(phase, transform) for phase in placed.sequence]
         return ContactSchedule(StanceSequence(phases), self.instants)
 
     def phase_at(self, time: ArrayLike) -> NDArray[np.int64]:
@@ -420,6 +431,16 @@ def _height(stance: Stance, feet: Sequence[str]) -> float:
     """How far the lowest of some feet is above the highest other contact [m]."""
     others = [other.position[2] for other in stance if other.effector not in feet]
     return float(min(stance[name].position[2] for name in feet) - max(others))
+
+
+def _turned(phase: Phase, transform: PlanarTransform) -> Phase:
+    """A phase with the directions of what it carries and exerts as seen from another frame."""
+    load, force = phase.load, phase.exerts
+    if load is not None:
+        load = replace(load, offset=transform.directions(load.offset))
+    if force is not None:
+        force = replace(force, direction=transform.directions(force.direction))
+    return replace(phase, load=load, exerts=force)
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:

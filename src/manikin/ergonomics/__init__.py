@@ -9,6 +9,14 @@ from manikin.ergonomics.assessment import (
 )
 from manikin.ergonomics.body_parts import bearing_of
 from manikin.ergonomics.capable_share import CapableShare, capable_share, capable_shares
+from manikin.ergonomics.force_limits import (
+    BASIC_FORCES,
+    ForceLimit,
+    ForceMultipliers,
+    force_limit,
+    force_multipliers,
+)
+from manikin.ergonomics.force_of_motion import ExertedOverTime, exerted_by
 from manikin.ergonomics.lift_of_motion import lift_of
 from manikin.ergonomics.lifting import (
     HandPlace,
@@ -35,14 +43,17 @@ from manikin.ergonomics.rula_reba import (
 )
 from manikin.ergonomics.sight import Sight, sight_of, sight_zone
 from manikin.ergonomics.static_postures import StaticPostures, static_postures
+from manikin.ergonomics.working_postures import PartPostures, WorkingPostures, working_postures
 
 __all__ = [
-    "Assessment", "CapableShare", "Circumstances", "Ergonomics", "HandPlace", "JointStrength", "Lift",
-    "LiftingIndex", "LoadAssessment", "LowBack", "LowestMargin", "Multipliers", "Owas", "ReachEnvelope",
-    "ReachUse", "RebaSteps", "RulaSteps", "Sight", "StaticPostures", "assess_posture", "bearing_of",
-    "capable_share", "capable_shares", "composite_index", "cumulative_effort", "ergonomics_of",
-    "joint_strength", "lift_of", "lifting_index", "loads_of", "low_back_load", "lowest_margin",
-    "owas_category", "owas_of", "postural_angles", "reach_envelopes", "reach_use", "reba_action_level",
-    "reba_score", "rula_action_level", "rula_score", "sight_of", "sight_zone", "static_postures",
-    "upright_neck",
+    "BASIC_FORCES", "Assessment", "CapableShare", "Circumstances", "Ergonomics", "ExertedOverTime",
+    "ForceLimit", "ForceMultipliers", "HandPlace", "JointStrength", "Lift", "LiftingIndex",
+    "LoadAssessment", "LowBack", "LowestMargin", "Multipliers", "Owas", "PartPostures", "ReachEnvelope",
+    "ReachUse", "RebaSteps", "RulaSteps", "Sight", "StaticPostures", "WorkingPostures", "assess_posture",
+    "bearing_of", "capable_share", "capable_shares", "composite_index", "cumulative_effort",
+    "ergonomics_of", "exerted_by", "force_limit", "force_multipliers", "joint_strength", "lift_of",
+    "lifting_index", "loads_of", "low_back_load", "lowest_margin", "owas_category", "owas_of",
+    "postural_angles", "reach_envelopes", "reach_use", "reba_action_level", "reba_score",
+    "rula_action_level", "rula_score", "sight_of", "sight_zone", "static_postures", "upright_neck",
+    "working_postures",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.ergonomics.assessment import PosturalAssessment, assess_posture, durations, known_torques
 from manikin.ergonomics.capable_share import CapableShare, capable_shares
+from manikin.ergonomics.force_of_motion import ExertedOverTime, exerted_by
 from manikin.ergonomics.lift_of_motion import carried, heaviest, lift_of
 from manikin.ergonomics.lifting import LiftingIndex, lifting_index
 from manikin.ergonomics.low_back import LowBack, low_back_load
@@ -19,6 +20,7 @@ from manikin.ergonomics.reach import ReachUse, reach_use
 from manikin.ergonomics.rula_reba import Circumstances
 from manikin.ergonomics.sight import ZONES, Sight, sight_of
 from manikin.ergonomics.static_postures import StaticPostures, static_postures
+from manikin.ergonomics.working_postures import VERDICTS, WorkingPostures, working_postures
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
@@ -36,9 +38,11 @@ class LoadAssessment:
         lifting: Of a motion with a load in both hands that goes up or down.
         lift_times: Instants of the ends of that lift [s].
         capable: Who has the strength, by sex; of motions with torques.
-        missing: Reason by part: ``"low_back"``, ``"lifting"``, ``"capable"``, ``"sight"``.
+        missing: Reason by part: ``"low_back"``, ``"lifting"``, ``"capable"``, ``"sight"``, ``"force"``.
         sight: Where the hands are in the field of view, of a human.
         reach: How much of their reach the hands use, of a human.
+        working: Working postures and movements, of a human.
+        force: What the hands push or pull, of a motion that does so.
     """
 
     owas: Owas | None
@@ -50,6 +54,8 @@ class LoadAssessment:
     missing: Mapping[str, str]
     sight: Sight | None = None
     reach: ReachUse | None = None
+    working: WorkingPostures | None = None
+    force: ExertedOverTime | None = None
 
     def as_dict(self, time: FloatArray) -> dict[str, Any]:
         """JSON-ready values (SI) of a motion at times (n,) [s]."""
@@ -58,11 +64,13 @@ class LoadAssessment:
         if lifting is not None and self.lift_times is not None:
             lifting |= {"from_s": self.lift_times[0], "to_s": self.lift_times[1]}
         timed = {
-            "owas": self.owas, "static_postures": self.static, "low_back": self.low_back, "sight": self.sight,
+            "owas": self.owas, "static_postures": self.static, "working_postures": self.working,
+            "low_back": self.low_back, "sight": self.sight,
         }  # fmt: skip
         found = {name: None if one is None else one.as_dict(weight) for name, one in timed.items()}
         reach = None if self.reach is None else self.reach.as_dict(time)
-        found |= {"reach": reach, "lifting": lifting, "capable": None}
+        force = None if self.force is None else self.force.as_dict()
+        found |= {"reach": reach, "lifting": lifting, "force": force, "capable": None}
         if self.capable is not None:
             found["capable"] = {sex: one.as_dict() for sex, one in self.capable.items()}
         return found
@@ -76,6 +84,13 @@ class LoadAssessment:
             columns["owas_category"] = self.owas.category
         if self.static is not None:
             columns["static_posture_level"] = self.static.level
+        if self.working is not None:
+            for name, part in self.working.parts.items():
+                columns[f"{name}_zone"] = part.zone
+            columns["working_posture_level_rare"] = self.working.rare
+            columns["working_posture_level_frequent"] = self.working.frequent
+        if self.force is not None:
+            columns["exerted_force_N"] = self.force.force
         if self.low_back is not None:
             columns["l5s1_compression_N"] = self.low_back.compression
             columns["l5s1_shear_N"] = self.low_back.shear
@@ -101,7 +116,7 @@ def loads_of(
         schedule: Its contacts, with what is carried in single phases.
     """
     missing: dict[str, str] = {}
-    owas, static, back, sight, reach = None, None, None, None, None
+    owas, static, back, sight, reach, working = None, None, None, None, None, None
     if posture is not None:
         reach = reach_use(body, motion.q)
         try:
@@ -110,6 +125,7 @@ def loads_of(
             missing["sight"] = str(error)
         owas = owas_of(body, motion, posture.angles, posture.bearing, given.load_kg)
         static = static_postures(motion.time, posture.angles)
+        working = working_postures(body, motion.time, motion.q, posture.angles, posture.bearing, given)
         back = _low_back(body, motion, schedule, given, missing)
     lifting, instants = (
         _lifting(body, motion, schedule, given, missing) if posture is not None else (None, None)
@@ -120,7 +136,10 @@ def loads_of(
             capable = capable_shares(body, motion.tau[rows, 6:], age=given.people_age)
         except BodyError as error:
             missing["capable"] = str(error)
-    return LoadAssessment(owas, static, back, lifting, instants, capable, missing, sight, reach)
+    force = _force(motion, schedule, given, missing) if posture is not None else None
+    return LoadAssessment(
+        owas, static, back, lifting, instants, capable, missing, sight, reach, working, force
+    )
 
 
 def _low_back(
@@ -154,6 +173,17 @@ def _lifting(
     return lifting_index(lift), instants
 
 
+def _force(
+    motion: Motion, schedule: ContactSchedule | None, given: Circumstances, missing: dict[str, str]
+) -> ExertedOverTime | None:
+    """What is pushed or pulled; the reason why that is not known goes to the missing."""
+    try:
+        return exerted_by(motion, schedule, given)
+    except InputError as error:
+        missing["force"] = str(error).partition(";")[0]
+        return None
+
+
 def ergonomics_in_short(
     body: BodyModel, motion: Motion, schedule: ContactSchedule | None = None
 ) -> dict[str, Any] | None:
@@ -165,14 +195,18 @@ def ergonomics_in_short(
         return None
     loads = loads_of(body, motion, posture, given, schedule)
     found = loads.as_dict(motion.time)
-    back, lift, capable = found["low_back"], found["lifting"], found["capable"]
+    back, lift, capable, force = (found[part] for part in ("low_back", "lifting", "capable", "force"))
+    working = found["working_postures"]
     return {
         "load_kg": given.load_kg, "rula_max": int(posture.rula.score.max()),
         "reba_max": int(posture.reba.score.max()), "owas_max": found["owas"]["max"],
         "owas_code": found["owas"]["code"],
+        "working_postures": {how: working[how]["verdict"] for how in ("rare", "frequent")},
         "l5s1_max_compression_N": None if back is None else back["max_compression_N"],
         "l5s1_level": None if back is None else back["level"],
         "lifting_index": None if lift is None else lift["index"],
+        "force_risk": None if force is None else force["risk"],
+        "force_verdict": None if force is None else force["verdict"],
         "reach_max_share": max(found["reach"]["max_share"].values()),
         "capable_min_share": None if capable is None else {sex: capable[sex]["min_share"] for sex in capable},
     }  # fmt: skip
@@ -185,6 +219,10 @@ def load_lines(report: Mapping[str, Any]) -> dict[str, str]:
         lines["OWAS"] = f"{owas['max']} ({owas['code']}) at {owas['max_at_s']:.2f} s: {owas['action']}"
     if (held := report["static_postures"]) is not None:
         lines["static postures"] = held["verdict"] + (f" ({held['part']})" if held["max"] > 1 else "")
+    if (working := report["working_postures"]) is not None:
+        lines["working postures"] = _working_line(working)
+    if (force := report["force"]) is not None:
+        lines["force of the hands"] = _force_line(force)
     if (back := report["low_back"]) is not None:
         lines["low back L5/S1"] = (
             f"{back['max_compression_N']:.0f} N at {back['max_at_s']:.2f} s, {back['level']}; "
@@ -210,3 +248,31 @@ def load_lines(report: Mapping[str, Any]) -> dict[str, str]:
         )
         lines["strong enough"] = ", ".join(shares)
     return lines
+
+
+def _working_line(report: Mapping[str, Any]) -> str:
+    """Verdicts of working postures: the known one, or that of rare and that of frequent movements."""
+    if (known := report["known"]) is not None:
+        return _judged(known)
+    rare, frequent = report["rare"], report["frequent"]
+    if rare["max"] == frequent["max"]:
+        return _judged(frequent)
+    return f"{_judged(rare)} below 2 movements a minute; else {_judged(frequent)}"
+
+
+def _judged(one: Mapping[str, Any]) -> str:
+    if one["max"] == min(VERDICTS):
+        return str(one["verdict"])
+    where = f"{readable(one['part'])} from {one['max_at_s']:.2f} s on"
+    return f"{one['verdict']} ({where}{': ' if one['condition'] else ''}{one['condition']})"
+
+
+def _force_line(report: Mapping[str, Any]) -> str:
+    """Risk of a push or pull with what is not known of its job."""
+    kind = report["activity"].removeprefix("body_")
+    best = {"frequency": "at most 0.2 times a minute", "duration": "for an hour at most"}
+    assumed = " ".join(best[name] for name in report["assumed"])
+    return (
+        f"{kind} of {report['force_N']:.0f} N, {report['verdict']} (risk {report['risk']:.2f}); "
+        f"recommended up to {report['recommended_N']:.0f} N" + (f", done {assumed}" if assumed else "")
+    )

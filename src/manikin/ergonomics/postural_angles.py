@@ -6,6 +6,7 @@ frames (x forward, y left, z up). All are 0 in the zero posture: upright, arms h
 * trunk: the line from between the hips to the base of the neck, against the vertical, in the vertical planes
   along and across the pelvis' heading; its twist is that of the segment with the shoulders on the pelvis;
 * neck: the head's axis in the frame of the segment with the shoulders;
+* head: its straight ahead against the horizontal, whatever trunk and neck do;
 * upper arm, elbow, forearm: directions of the segments in the frame of the segment with the shoulders;
 * wrist: the forearm's direction in the frame of the hand; twist of the forearm against the upper arm.
 
@@ -39,6 +40,8 @@ class ArmAngles:
         abduction: Of the upper arm out of that plane, outward positive [rad].
         elevation: Between the upper arm and the chest's downward axis [rad].
         from_vertical: Between the upper arm and the world's downward vertical [rad].
+        ahead, beside: Of the upper arm out of the vertical planes across and along the chest's heading,
+            forward and outward positive [rad].
         elbow: Flexion, 0 for a straight arm [rad].
         outward: Of the forearm out of the sagittal plane of the chest, outward positive [rad].
         aside: Of the wrist from the middle plane of the chest, negative across it [m].
@@ -51,6 +54,8 @@ class ArmAngles:
     abduction: FloatArray
     elevation: FloatArray
     from_vertical: FloatArray
+    ahead: FloatArray
+    beside: FloatArray
     elbow: FloatArray
     outward: FloatArray
     aside: FloatArray
@@ -75,6 +80,7 @@ class PosturalAngles:
     Attributes:
         trunk_flexion, neck_flexion: Forward positive [rad].
         trunk_side_bend, trunk_twist, neck_side_bend, neck_twist: To the left positive [rad].
+        head_inclination: Of the head's straight ahead below the horizontal [rad].
         knees: Flexion by side [rad].
     """
 
@@ -84,6 +90,7 @@ class PosturalAngles:
     neck_flexion: FloatArray
     neck_side_bend: FloatArray
     neck_twist: FloatArray
+    head_inclination: FloatArray
     arms: Mapping[str, ArmAngles]
     knees: Mapping[str, FloatArray]
 
@@ -115,8 +122,8 @@ def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -
     Args:
         body: A human: two arms and two legs of three segments, and a head.
         q: (n, nq) configurations.
-        neck_upright: Flexion of an upright neck, from which that of the neck is counted [rad]. 0 for what
-            we plan; of recordings see :func:`upright_neck`.
+        neck_upright: Flexion of an upright neck, from which that of the neck and the head's inclination are
+            counted [rad]. 0 for what we plan; of recordings see :func:`upright_neck`.
 
     Raises:
         BodyError: If the body is no human, or the configurations are of another body.
@@ -134,6 +141,7 @@ def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -
         trunk_flexion=forward, trunk_side_bend=aside, trunk_twist=twist_about_z(at.turned(chest, pelvis)),
         neck_flexion=np.arctan2(looks[:, 0, 2], looks[:, 2, 2]) - neck_upright,
         neck_side_bend=_arcsin(looks[:, 1, 2]), neck_twist=twist_about_z(looks),
+        head_inclination=_below_level(at.turns[head]) - neck_upright,
         arms={side: _arm(at, parts.arms[side], chest, side) for side in SIDES},
         knees={side: _tilt(at.turned(shank, thigh)) for side, (thigh, shank, _) in parts.legs.items()},
     )  # fmt: skip
@@ -153,11 +161,16 @@ def upright_neck(body: BodyModel, q: FloatArray) -> float | None:
     return float(np.median(angles.neck_flexion[upright])) if upright.any() else None
 
 
-def _upright_axes(pelvis: FloatArray) -> FloatArray:
-    """(n, 3, 3) forward, left and up as rows, where the pelvis' left is made level."""
-    left = unit(pelvis[:, :, 1] * [1.0, 1.0, 0.0], 1e-12)
+def _upright_axes(turn: FloatArray) -> FloatArray:
+    """(n, 3, 3) forward, left and up as rows, where a segment's left is made level."""
+    left = unit(turn[:, :, 1] * [1.0, 1.0, 0.0], 1e-12)
     up = np.broadcast_to([0.0, 0.0, 1.0], left.shape)
     return np.stack([np.cross(left, up), left, up], axis=1)
+
+
+def _below_level(turn: FloatArray) -> FloatArray:
+    """(n,) angle of a segment's x axis below the horizontal, beyond 90 degrees upside down."""
+    return np.arctan2(-turn[:, 2, 0], turn[:, 2, 2])
 
 
 def _bend(axes: FloatArray, line: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -182,6 +195,7 @@ class _Frames:
 def _arm(at: _Frames, arm: tuple[str, str, str], chest: str, side: str) -> ArmAngles:
     outward = 1.0 if side == "left" else -1.0
     upper, fore = (-at.turned(name, chest)[:, :, 2] for name in arm[:2])  # limbs hang along -z
+    ahead, beside, _ = np.einsum("nij,nj->in", _upright_axes(at.turns[chest]), -at.turns[arm[0]][:, :, 2])
     away = at.places[arm[2]] - at.places[chest]
     in_upper_arm, wrist = at.turned(arm[1], arm[0]), at.turned(arm[2], arm[1])
     in_hand = wrist[:, 2, :]  # the forearm's long axis, free of a turn about it
@@ -189,6 +203,7 @@ def _arm(at: _Frames, arm: tuple[str, str, str], chest: str, side: str) -> ArmAn
     return ArmAngles(
         flexion=np.arctan2(upper[:, 0], -upper[:, 2]), abduction=outward * _arcsin(upper[:, 1]),
         elevation=_tilt(at.turned(arm[0], chest)), from_vertical=_tilt(at.turns[arm[0]]),
+        ahead=_arcsin(ahead), beside=outward * _arcsin(beside),
         elbow=_tilt(in_upper_arm), outward=outward * _arcsin(fore[:, 1]),
         aside=outward * dot(at.turns[chest][:, :, 1], away), wrist_flexion=-outward * _arcsin(in_hand[:, 1]),
         wrist_deviation=np.arctan2(in_hand[:, 0], in_hand[:, 2]), wrist_twist=-outward * turn,

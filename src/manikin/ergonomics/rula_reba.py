@@ -123,6 +123,9 @@ class Circumstances:
         lifts_per_minute, lifting_hours: How often a load is lifted, and for how long at a stretch [h].
         people_age: Age of the people whose strength is compared [years]; None for that of the body.
         back_lever_m: Lever of the back's muscles about L5/S1 [m].
+        cycles_per_minute: How often the motion is made; None where it is not known.
+        job_hours: For how long such motions are made at a stretch [h]; None where it is not known.
+        domestic: Whether what is pushed or pulled is used at home, not by workers.
     """
 
     load_kg: float = 0.0
@@ -138,6 +141,9 @@ class Circumstances:
     lifting_hours: float = 1.0
     people_age: float | None = None
     back_lever_m: float = 0.05
+    cycles_per_minute: float | None = None
+    job_hours: float | None = None
+    domestic: bool = False
 
     def __post_init__(self) -> None:
         finite_number(self.load_kg, "load [kg]", at_least=0.0)
@@ -145,6 +151,10 @@ class Circumstances:
         finite_number(self.lifts_per_minute, "lifts per minute", at_least=0.0)
         finite_number(self.lifting_hours, "hours of lifting", above=0.0, at_most=8.0)
         finite_number(self.back_lever_m, "lever of the back's muscles [m]", at_least=0.03, at_most=0.09)
+        if self.cycles_per_minute is not None:
+            finite_number(self.cycles_per_minute, "cycles per minute", at_least=0.0)
+        if self.job_hours is not None:
+            finite_number(self.job_hours, "hours of the job", above=0.0, at_most=8.0)
         if self.people_age is not None:
             finite_number(
                 self.people_age, "age of the people [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1]

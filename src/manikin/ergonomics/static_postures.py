@@ -98,13 +98,13 @@ class StaticPostures:
 
 def static_postures(time: FloatArray, angles: PosturalAngles) -> StaticPostures:
     """Find the static postures of a motion and judge them."""
-    trunk, neck = degrees(angles.trunk_flexion), degrees(angles.neck_flexion)
+    trunk, head = degrees(angles.trunk_flexion), degrees(angles.head_inclination)
     turned_trunk = _turned(angles.trunk_twist, angles.trunk_side_bend)
     turned_head = _turned(angles.neck_twist, angles.neck_side_bend)
     lean = np.rad2deg(np.arccos(np.cos(angles.trunk_flexion) * np.cos(angles.trunk_side_bend)))
     found = {
         "trunk": _judged(time, "trunk", _upright(np.where(trunk < 0.0, -lean, lean)), turned_trunk),
-        "head": _judged(time, "head", _upright(trunk + neck), turned_head),
+        "head": _judged(time, "head", _upright(head), turned_head),
     }
     for side in SIDES:
         raised = degrees(angles.arms[side].from_vertical)

@@ -13,8 +13,17 @@ import numpy as np
 
 from manikin.body import BodyModel, Effector, Hinge, Limb, Segment
 from manikin.body import Shape as BodyShape
-from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance
-from manikin.contact.stance import StanceSequence
+from manikin.contact import (
+    CarriedLoad,
+    Contact,
+    ContactKind,
+    ContactSchedule,
+    ExertedForce,
+    Phase,
+    SolePart,
+    Stance,
+    StanceSequence,
+)
 from manikin.numerics.spatial import frozen_array
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.scene.obstacle import Shape
@@ -139,6 +148,8 @@ def describe_schedule(schedule: ContactSchedule) -> Json:
         })  # fmt: skip
         if (load := phase.load) is not None:
             phases[-1]["load"] = {"masses_kg": dict(load.masses), "offset": load.offset.tolist()}
+        if (force := phase.exerts) is not None:
+            phases[-1]["exerts"] = {"kind": force.kind, "direction": force.direction.tolist()}
     return {"instants": schedule.instants.tolist(), "phases": phases}
 
 
@@ -154,13 +165,19 @@ def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:
         contacts = [_contact_from(contact) for contact in phase["contacts"]]
         stance = Stance(contacts, phase["normal_force_cap"], phase.get("friction_model", "outer"))
         load = _load_from(phase["load"]) if "load" in phase else None
-        phases.append(Phase(stance, phase["min_duration"], phase["max_duration"], load))
+        force = _exerted_from(phase["exerts"]) if "exerts" in phase else None
+        phases.append(Phase(stance, phase["min_duration"], phase["max_duration"], load, exerts=force))
     return ContactSchedule(StanceSequence(phases), description["instants"])
 
 
 def _load_from(description: Mapping[str, Any]) -> CarriedLoad:
     offset = frozen_array(description["offset"], "offset of the load [m]", (3,))
     return CarriedLoad(description["masses_kg"], offset)
+
+
+def _exerted_from(description: Mapping[str, Any]) -> ExertedForce:
+    direction = frozen_array(description["direction"], "direction of the exerted force", (3,))
+    return ExertedForce(description["kind"], direction)
 
 
 def _describe_contact(contact: Contact) -> Json:

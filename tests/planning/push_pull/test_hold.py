@@ -26,10 +26,12 @@ def schedule(brace):
 
 
 def test_an_act_is_appended_at_rest_with_its_forces(brace, push, still, schedule):
-    planned = plan_act(still, schedule, brace.forces, 0.5, 1.0)
+    planned = plan_act(still, schedule, push, brace.forces, 0.5, 1.0)
     assert planned.timing == Timing(0.5, 0.5, 1.0)
     assert planned.motion.time[-1] == pytest.approx(2.0)
     assert planned.schedule.instants[-1] == pytest.approx(2.0)
+    assert planned.schedule.sequence[-1].exerts.kind == "push"
+    np.testing.assert_array_equal(planned.schedule.sequence[-1].exerts.direction, push.direction)
     np.testing.assert_array_equal(planned.motion.q[-1], brace.q)
     assert not planned.motion.v[51:].any()
     np.testing.assert_allclose(planned.motion.tau[-1, 6:], brace.forces.tau)
@@ -39,7 +41,7 @@ def test_an_act_is_appended_at_rest_with_its_forces(brace, push, still, schedule
 
 def test_what_was_planned_measures_as_what_was_wanted(body, brace, push, still, schedule):
     """The forces of the program, taken for measured ones, are the act's, inside friction and balanced."""
-    planned = plan_act(still, schedule, brace.forces, 0.5, 1.0)
+    planned = plan_act(still, schedule, push, brace.forces, 0.5, 1.0)
     found = measure_act(planned.motion, planned.schedule, push, planned.timing, body.mass, 0.7)
     assert found.mean_force == pytest.approx(push.force)
     assert found.least_force == pytest.approx(push.force)
@@ -49,5 +51,5 @@ def test_what_was_planned_measures_as_what_was_wanted(body, brace, push, still, 
 
 
 def test_an_act_that_was_not_reached_has_no_measures(body, brace, push, still, schedule):
-    planned = plan_act(still, schedule, brace.forces, 0.5, 1.0)
+    planned = plan_act(still, schedule, push, brace.forces, 0.5, 1.0)
     assert measure_act(still, planned.schedule, push, planned.timing, body.mass, 0.7) is None

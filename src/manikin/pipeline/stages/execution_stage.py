@@ -182,7 +182,7 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
         report.planned = False
         report.fail("wholebody", reason, planned.end, act.obstacle)
         return planned
-    acting = push_pull.plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
+    acting = push_pull.plan_act(planned.motion, planned.schedule, act, forces, section.ramp_s, section.hold_s)
     report.keep_motions(acting.schedule, acting.motion)
     return replace(planned, schedule=acting.schedule, motion=acting.motion, act=acting)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from manikin.balance import motion_margin
 from manikin.body.segments import HANDS
-from manikin.contact import ContactKind, ContactSchedule, Stance
+from manikin.contact import ContactKind, ContactSchedule, ExertedForce, Stance, StanceSequence
 from manikin.control import ForceWish
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
@@ -46,12 +46,13 @@ class PlannedAct:
 
 
 def plan_act(
-    motion: Motion, schedule: ContactSchedule, forces: BracedForces, ramp: float, hold: float
+    motion: Motion, schedule: ContactSchedule, act: Act, forces: BracedForces, ramp: float, hold: float
 ) -> PlannedAct:
     """Append an act to a motion that ends at rest with its hands on the object.
 
     The last stance of the schedule has feet and hands, and the forces are those of the last posture with the
-    act's force, contacts in that order. They rise for ``ramp`` and are held for ``hold`` [s].
+    act's force, contacts in that order. They rise for ``ramp`` and are held for ``hold`` [s]. The last phase
+    says what the hands exert.
     """
     timing = Timing(float(motion.time[-1]), ramp, hold)
     stance = schedule.sequence[-1].stance
@@ -60,7 +61,9 @@ def plan_act(
         for k, contact in enumerate(stance)
         if contact.effector in HANDS
     )
-    prolonged = ContactSchedule(schedule.sequence, np.append(schedule.instants[:-1], timing.end))
+    *before, last = schedule.sequence
+    acting = replace(last, exerts=ExertedForce(str(act.kind), act.direction))
+    prolonged = ContactSchedule(StanceSequence([*before, acting]), [*schedule.instants[:-1], timing.end])
     return PlannedAct(_held(motion, stance, forces, timing), prolonged, timing, wishes)
 
 
