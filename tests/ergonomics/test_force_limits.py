@@ -120,6 +120,8 @@ def test_what_the_hands_exert_against_its_limit(body, kind, direction, domestic,
     assert found.limit.risk == pytest.approx(120.0 / basic)
     assert found.time == pytest.approx(2.0)
     assert found.action_time == pytest.approx(2.0, abs=0.11)
+    longer = replace(motion, time=motion.time * 1.5)  # what lasts beyond the planned contacts does not count
+    assert exerted_by(longer, schedule, Circumstances()).action_time == pytest.approx(1.0, abs=0.16)
     assert np.isnan(found.force[:20]).all()
     assert found.assumed == ("frequency", "duration")
     told = exerted_by(motion, schedule, Circumstances(cycles_per_minute=1.0, job_hours=4.0))
@@ -154,7 +156,7 @@ def test_reports_tell_both_standards(body):
     lines = load_lines(report)
     assert lines["force of the hands"] == (
         "push of 120 N, not recommended (risk 0.60); recommended up to 100 N, "
-        "done at most 0.2 times a minute for an hour at most"
+        "done at most 0.2 times a minute and for an hour at most"
     )
     assert lines["working postures"] == "acceptable"
     series = found.series()

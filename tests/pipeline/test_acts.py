@@ -92,6 +92,7 @@ def test_the_force_is_held_in_the_physics_engine(runs):
     assert act["held_s"] >= 1.95
     assert act["max_torque_share"] <= 1.0
     assert act["equilibrium_residual"] < 1e-6
+    assert result.summary["ergonomics"]["force_verdict"] == "to be avoided"  # of 200 N at most, EN 1005-3
     assert not result.summary["execution"]["fell"]
     # The run directory holds the scenario with its supports and the act, ready to run again.
     again = load_scenario(result.directory / "scenario.yaml")

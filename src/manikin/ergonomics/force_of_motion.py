@@ -23,7 +23,7 @@ from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 
-EXERTED = 0.1
+EXERTED = 0.5
 """Share of its largest force from which on an action lasts; ours."""
 
 
@@ -72,8 +72,9 @@ def exerted_by(
         return None
     hands = [column for column, name in enumerate(motion.contact_names) if name in HANDS]
     phases, force = schedule.phase_at(motion.time), np.full(len(motion.time), np.nan)
+    planned = motion.time <= schedule.instants[-1] + 1e-9  # what follows in the engine is to settle
     for number, exerted in acting:
-        rows = phases == number
+        rows = (phases == number) & planned
         on_object = -motion.contact_force[rows][:, hands, :3].sum(axis=1)
         force[rows] = on_object @ exerted.direction
     if not np.isfinite(force).any():

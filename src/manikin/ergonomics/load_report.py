@@ -271,7 +271,7 @@ def _force_line(report: Mapping[str, Any]) -> str:
     """Risk of a push or pull with what is not known of its job."""
     kind = report["activity"].removeprefix("body_")
     best = {"frequency": "at most 0.2 times a minute", "duration": "for an hour at most"}
-    assumed = " ".join(best[name] for name in report["assumed"])
+    assumed = " and ".join(best[name] for name in report["assumed"])
     return (
         f"{kind} of {report['force_N']:.0f} N, {report['verdict']} (risk {report['risk']:.2f}); "
         f"recommended up to {report['recommended_N']:.0f} N" + (f", done {assumed}" if assumed else "")

@@ -5,9 +5,11 @@ acceptable or not acceptable: as a static posture, for movements below two a min
 ones. How often a job repeats a motion is not in the motion: where it is not known, both are told.
 
 The printed standard was not at hand: zones and levels were taken from what quotes it, a guide of the German
-accident insurers ([DGUV209-069]_), the help of an ergonomics program ([DELMIA]_), a study
-([JOMT2020]_) and an open program, held against what is known of the standard here. :data:`SOURCES` says by
-part how many of them give the levels; where they differ, the docs page on ergonomics tells it.
+accident insurers ([DGUV209-069]_), the help of an ergonomics program ([DELMIA]_), a study ([JOMT2020]_) and
+two open programs, held against what is known of the standard here. :data:`SOURCES` says how many of them
+give the zones of a part; the docs page on ergonomics says it by level, and where they differ. No second
+source confirms rare movements of the trunk and the neck, the upper arm backwards, and the line of sight; none
+at all twisting of the neck and the ends of other joints.
 """
 
 from collections.abc import Mapping
@@ -70,12 +72,11 @@ up to 60, beyond, backwards or across the body. Of the others: near the middle, 
 """
 
 SOURCES: Mapping[str, int] = {
-    "trunk": 1, "trunk_aside": 2, "upper_arm": 2, "head": 1, "neck_aside": 1, "joints": 0,
+    "trunk": 2, "trunk_aside": 2, "upper_arm": 2, "head": 1, "neck_aside": 1, "joints": 0,
 }  # fmt: skip
-"""Least number of sources at hand for levels and borders of a part, besides what is known of the standard.
+"""Number of sources at hand that give the zones of a part, two standing for two or more.
 
-What has none is told, but does not count in the level of the whole posture. Of the neck one source has the
-border of bending, none that of twisting.
+What has none is told, but does not count in the level of the whole posture.
 """
 
 SUPPORTED = "only with full support"

@@ -17,6 +17,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from PIL import Image, UnidentifiedImageError
 
 from manikin.analysis import Analysis
+from manikin.ergonomics.load_report import load_lines
+from manikin.ergonomics.working_postures import VERDICTS as LEVELS
 from manikin.pipeline.run_directory import REPORT, SCENARIO, RunRecord, read_run, read_summary
 from manikin.pipeline.study import PAGE
 from manikin.reports.figures import png_of
@@ -78,6 +80,7 @@ def _environment() -> Environment:
         "readable": readable, "shown": _shown, "fixed": _fixed, "width": _width,
         "mm": lambda value, decimals=1: "-" if value is None else f"{1e3 * value:.{decimals}f}",
         "share": lambda value: _fixed(value, "%", 100.0),
+        "level": LEVELS.__getitem__,
         "base64": lambda png: base64.b64encode(png).decode("ascii"),
     }  # fmt: skip
     return environment
@@ -183,6 +186,7 @@ def analysis_page(analysis: Analysis, summary: Mapping[str, Any], sheets: tuple[
     sheet, cycles = sheets
     missing = [f"{part}: {reason}" for part, reason in summary["ergonomics"]["missing"].items()]
     shown = {"name": analysis.name, "sheet": sheet, "cycles": cycles, "missing": missing}
+    shown["loads"] = load_lines(summary["ergonomics"])
     shown["motion"] = player_data(analysis.body, analysis.motion) if sheet else None
     return render("analysis", summary=summary, **shown)
 
