@@ -66,6 +66,23 @@ def test_solution_obeys_the_equation_of_motion(body, still, schedule, seed):
     assert np.abs(needed[6:] - output.tau).max() < 1e-6
 
 
+def test_torques_move_inertia_beside_that_of_the_body(body, still, schedule):
+    """2 kg.m^2 more at the toes take twice their accelerations on top of inverse dynamics, to 1e-6 N.m."""
+    added = np.array([2.0 if "toe" in name else 0.0 for name in body.joint_names])
+    controller = Controller(body, still, schedule, joint_inertia=added)
+    q, v = disturbed(body, 0)
+    output, x = solve(controller, q, v)
+    problem = output.problem
+    forces = sum(
+        loaded.basis.generalised @ x[part]
+        for loaded, part in zip(problem.contacts, problem.variables, strict=True)
+    )
+    data = body.pinocchio.createData()
+    needed = pin.rnea(body.pinocchio, data, q, v, output.acceleration) - forces
+    assert np.abs(output.acceleration[6:][added > 0.0]).max() > 0.1
+    assert output.tau == pytest.approx(needed[6:] + added * output.acceleration[6:], abs=1e-6)
+
+
 @settings(max_examples=15)
 @given(seed=st.integers(0, 10_000), speed=st.floats(0.0, 1.0))
 def test_forces_stay_in_friction_cones_and_torques_within_limits(body, still, schedule, seed, speed):

@@ -55,6 +55,20 @@ def test_squat_and_sway(body, stand):
     assert not result.fallbacks
 
 
+def test_a_motion_that_begins_at_speed_stands_at_once(body, stand):
+    """Feet planned 0.05 mm above the floor carry at least half the weight in the first millisecond."""
+    plan = stand(0.6, lambda t: np.array([0.0, 0.0, -0.05]) * smooth(t / 0.6))
+    motion, half = plan.motion, plan.motion.time.searchsorted(0.3)
+    fields = ("q", "v", "a", "tau", "com", "angular_momentum", "margin", "support", "contact_force")
+    late = {name: getattr(motion, name)[half:].copy() for name in fields}
+    late["q"][:, 2] += 5e-5 - Configuration(body, late["q"][0]).effector_placement("left_foot")[1][2]
+    begun = replace(motion, time=motion.time[half:] - motion.time[half], **late)
+    instants = ContactSchedule(plan.schedule.sequence, [0.0, begun.duration])
+    result = execute(body, Scene(), begun, instants, hold=0.0)
+    assert result.succeeded
+    assert result.motion.contact_force[0, :, 2].sum() > 0.5 * body.mass * GRAVITY
+
+
 @pytest.mark.parametrize(
     ("stature", "mass"), [(1.55, 50.0), pytest.param(1.95, 110.0, marks=pytest.mark.long)]
 )

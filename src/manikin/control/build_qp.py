@@ -150,6 +150,7 @@ def build_qp(
     state: DynamicsState, tasks: Sequence[AccelerationTask], contacts: Sequence[LoadedContact],
     bounds: JointBounds, damping: FloatArray, *, period: float, acceleration_weight: float,
     force_weight: float, sum_cap: float | None = None, partings: Sequence[Parting] = (),
+    inertia: FloatArray | None = None,
 ) -> ControlProblem:  # fmt: skip
     """Build the program of one control step.
 
@@ -162,6 +163,7 @@ def build_qp(
         force_weight: Regularisation of the force variables.
         sum_cap: Largest sum of the normal forces [N], or None.
         partings: Parts of the body that keep apart.
+        inertia: (nv - 6,) inertia about the joints beside that of the body [kg.m^2]; None without.
     """
     nv, bases = len(state.v), [loaded.basis for loaded in contacts]
     variables = force_variables(bases, nv)
@@ -178,6 +180,8 @@ def build_qp(
         lower[part], upper[part] = basis.lower * share, basis.upper * share
     joint_map = rows[6:nv]
     joint_map[:, 6:nv].flat[:: nv - 5] += 0.5 * period * damping
+    if inertia is not None:
+        joint_map[:, 6:nv].flat[:: nv - 5] += inertia
     joint_offset = state.bias[6:] + damping * state.v[6:]
     rows[nv : nv + len(caps)] = caps
     for row, parting in enumerate(partings, nv + len(caps)):

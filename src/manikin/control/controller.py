@@ -34,12 +34,14 @@ to leave, relative to the weight: of three points none can be spared, and one th
 RAISED = 0.006
 """Points this far above the lowest one of a contact that settles may carry load, twice as far none [m]."""
 
+ROUNDING = 1e-6
+"""Points that lie no farther apart along a sole are on one line across it [m]."""
+
 RAISED_TOES, BOUNCED = 0.001, 0.05
 """The same of the tips of toes [m], and their angle from the plan from which they have bounced off [rad]."""
 
 TOES_BACK = Impedance(10000.0, 250.0)
-"""Gains with which toes that have bounced off come down. The engine's toes have a least inertia, some six
-times their own, of which the controller does not know; and the edge behind their hinge jams on the floor."""
+"""Gains with which toes that have bounced off come down: the edge behind their hinge jams on the floor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +90,7 @@ class Controller:
     def __init__(
         self, body: BodyModel, motion: Motion, schedule: ContactSchedule,
         settings: ControlSettings | None = None, *, joint_damping: ArrayLike | None = None,
-        wishes: Sequence[ForceWish] = (),
+        joint_inertia: ArrayLike | None = None, wishes: Sequence[ForceWish] = (),
     ) -> None:  # fmt: skip
         """Prepare the controller.
 
@@ -97,6 +99,7 @@ class Controller:
             motion: What to follow.
             settings: Weights, gains and limits; the defaults when omitted.
             joint_damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; none when omitted.
+            joint_inertia: (nv - 6,) inertia about the joints beside that of the body [kg.m^2].
             wishes: Forces that effectors in contact should feel, at most one of each.
 
         Raises:
@@ -109,6 +112,8 @@ class Controller:
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
+        inertia = np.zeros(joints) if joint_inertia is None else joint_inertia
+        self._inertia = frozen_array(inertia, "joint_inertia [kg.m^2]", (joints,))
         self._wishes = {wish.effector: wish for wish in wishes}
         self._switch = SupportSwitch(schedule, self.settings.supports)
         every = [contact for phase in schedule.sequence for contact in phase.stance]
@@ -196,6 +201,7 @@ class Controller:
             period=settings.period, acceleration_weight=settings.weights.acceleration,
             force_weight=settings.weights.force, sum_cap=self.schedule.stance_at(time).normal_force_cap,
             partings=self._watch.partings(state, reference, horizon, settings.period),
+            inertia=self._inertia,
         )  # fmt: skip
 
     def geometry(self, contact: Contact) -> ContactGeometry:
@@ -218,7 +224,7 @@ class Controller:
         )
         for name, toes in self._toes.items():  # followed as their foot is
             gain = gains.posture if supports[name].mode is SupportMode.STANCE else gains.swing
-            if self.settings.watch_toes and _lies_flat(supports[name]):
+            if self.settings.watch_toes and supports[name].mode is SupportMode.STANCE:
                 away = np.abs(state.q[7:][toes] - reference.q[7:][toes])
                 gain = TOES_BACK if away.max(initial=0.0) > BOUNCED else gain
             if toes:
@@ -308,7 +314,7 @@ class Controller:
         upper = None
         if support.settling:
             upper = cap * self._low_shares(geometry, contact, state)
-        elif self.settings.watch_toes and _lies_flat(support) and len(geometry.patches) > 1:
+        elif self.settings.watch_toes and self._toes.get(support.effector):
             upper = cap * self._toe_shares(geometry, contact, state)
         if support.fades:
             fading = state.mass * GRAVITY * self._fading_shares(support, contact)
@@ -325,15 +331,18 @@ class Controller:
         height = np.concatenate(list(places))
         return np.clip(2.0 - (height - height.min()) / raised, 0.0, 1.0)
 
-    @classmethod
-    def _toe_shares(cls, geometry: ContactGeometry, contact: Contact, state: DynamicsState) -> FloatArray:
+    def _toe_shares(self, geometry: ContactGeometry, contact: Contact, state: DynamicsState) -> FloatArray:
         """(k,) shares of the load as of :meth:`_low_shares` of the tips of toes.
 
         Toes are light: those that bounce off as a foot lands would be thrown back by the torque for a load
-        that they do not carry. What is behind their hinge keeps its share.
+        that they do not carry. What is behind their hinge, or next to it, keeps its share.
         """
-        shares = cls._low_shares(geometry, contact, state, RAISED_TOES)
-        shares[: len(geometry.patches[0][1])] = 1.0
+        shares = self._low_shares(geometry, contact, state, RAISED_TOES)
+        behind = len(geometry.patches[0][1]) if len(geometry.patches) > 1 else 0
+        shares[:behind] = 1.0
+        if contact.part is SolePart.TOES:
+            along = self._along[_touching_points(contact)]
+            shares[along <= along.min() + ROUNDING] = 1.0
         return shares
 
     def _fading_shares(self, support: SupportState, contact: Contact) -> FloatArray:

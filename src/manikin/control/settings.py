@@ -240,7 +240,7 @@ class ControlSettings:
         returning: What to do when the body is off its plan; None follows the plan as ever.
         stepping: How the steps of a walk are moved when the body is off its plan; None never moves them.
         watch_toes: Whether toes that bounce off as a foot lands carry nothing until they are down again, and
-            come down fast; for motions that land at speed.
+            come down fast, by torques that know their inertia in the engine; for motions that land at speed.
     """
 
     period: float = 0.005

@@ -328,7 +328,7 @@ def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:
 
 def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
     made: dict[str, Any] = {}
-    contact, lacking = _contact(options, scenery=False), _lacking_inertia(body, options.least_inertia)
+    contact, lacking = _contact(options, scenery=False), lacking_inertia(body, options.least_inertia)
     for segment in body.segments:
         parent = spec.worldbody if segment.parent is None else made[segment.parent]
         item = parent.add_body(name=segment.name, pos=segment.origin)
@@ -361,8 +361,8 @@ SOFT_IMPEDANCE = (0.3, 0.8, 0.005)
 under load, so that a body slides on a cushion instead of bouncing along it."""
 
 
-def _lacking_inertia(body: BodyModel, least: float) -> dict[str, float]:
-    """Inertia about each hinge [kg.m^2] that what it moves has less than the least, standing."""
+def lacking_inertia(body: BodyModel, least: float) -> dict[str, float]:
+    """Inertia that what each hinge moves has less than the least, standing [kg.m^2], by the hinge's name."""
     model = body.pinocchio
     own = np.diag(pin.crba(model, model.createData(), body.standing_posture()))[6:]
     return dict(zip(body.joint_names, np.maximum(least - own, 0.0).tolist(), strict=True))

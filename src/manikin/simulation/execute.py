@@ -19,7 +19,7 @@ from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.scene import Proximity, Scene
-from manikin.simulation.compile import PhysicsOptions, compile_model, is_narrow
+from manikin.simulation.compile import PhysicsOptions, compile_model, is_narrow, lacking_inertia
 from manikin.simulation.execution import Execution, push_outcome
 from manikin.simulation.push_force import Push
 from manikin.simulation.recorder import ROUNDING, SWITCHING, Recorder
@@ -34,7 +34,8 @@ sinks and chatters where damping times time step exceeds its inertia. The contro
 LEAST_INERTIA = 1.4e-5
 """Least inertia of what a hinge moves in the default physics, over the body's mass and the squared height of
 its centre of mass standing: 1e-3 kg.m^2 for a man, which toes alone lack (1.6e-4). They chattered where a
-heel rose under load, at 75 rad/s and 10 mm into the floor. The controller does not know it; our choice."""
+heel rose under load, at 75 rad/s and 10 mm into the floor. The controller knows of it only where it watches
+toes; our choice."""
 
 CONTACT_TIME = 3e-3
 """Time constant of the contacts in the default physics [s]: a stiff floor, three time steps. Halves sinking
@@ -49,6 +50,11 @@ FALL_DISTANCE = 0.3
 SETTLING = 0.2
 """Time to stand in the first posture before the motion begins, unrecorded [s]; the feet sink in by the
 fraction of a millimetre that the contact needs to carry."""
+
+SUNK = 2e-4
+"""Depth at which what carries a body begins that is at speed and cannot settle [m]: of contacts that do not
+touch, the engine knows nothing in its first step, and a foot is pushed down at 1 m/s by the torques of its
+load."""
 
 _AT_REST = 1e-2
 """A motion whose first, or last, speeds are smaller than this begins, or ends, at rest [m/s, rad/s]."""
@@ -143,7 +149,11 @@ class _Run:
             told = f"control period is {self.period:g} s and physics timestep {step:g} s"
             raise InputError(f"{told}; valid: a whole multiple")
         damping = np.full(body.nv - 6, physics.joint_damping)
-        self.controller = Controller(body, motion, schedule, settings, joint_damping=damping, wishes=wishes)
+        added = lacking_inertia(body, physics.least_inertia) if settings.watch_toes else {}
+        inertia = np.array([added.get(name, 0.0) for name in body.joint_names])
+        self.controller = Controller(
+            body, motion, schedule, settings, joint_damping=damping, joint_inertia=inertia, wishes=wishes
+        )
         self.holds: list[_Hold] = []
         for effector in schedule.sequence.effectors:
             lying = tuple(sorted({segment for segment, _ in touching_pairs(body, [(effector, "")])}))
@@ -177,7 +187,8 @@ class _Run:
         # None when the motion begins at speed.
         at_rest = float(np.abs(self.plan.v[0]).max()) < _AT_REST
         settle = round(SETTLING / self.period) if at_rest else 0
-        self.world.reset(self._first_posture(), self.plan.v[0], start - settle * self.period)
+        posture = self._first_posture() if at_rest else self._sunk(self._first_posture())
+        self.world.reset(posture, self.plan.v[0], start - settle * self.period)
         count = round((self.plan.duration + hold) / self.period) + 1
         if hold == 0.0 and np.abs(self.plan.v[-1]).max() >= _AT_REST:
             count = max(count - 1, 1)  # At its end, a motion that ends at speed would be stopped dead.
@@ -215,6 +226,15 @@ class _Run:
         )
         q[2] += max(near - there, 0.0) if np.isfinite(near) else 0.0
         return q
+
+    def _sunk(self, q: FloatArray) -> FloatArray:
+        """(nq,) posture moved along the mean normal of what carries it first, by :data:`SUNK`."""
+        held = [item for item in self.schedule.sequence[0].stance if item.kind is not ContactKind.GRASP]
+        if not held:
+            return q
+        moved = np.array(q)
+        moved[:3] -= SUNK * np.mean([item.normal for item in held], axis=0)
+        return moved
 
     def _told(self) -> tuple[FloatArray, FloatArray]:
         """Configuration and velocity as control is told them."""
