@@ -22,7 +22,7 @@ from manikin.analysis.contact_adaptation import (
     without_remnants,
 )
 from manikin.analysis.motion_transfer import MotionOnContacts, carried_over
-from manikin.analysis.posture_adaptation import AdaptedMotion, adapt_postures, rate_on_contacts, rate_on_plan
+from manikin.analysis.posture_adaptation import AdaptedMotion, adapt_postures, rate_as_recorded, rate_on_plan
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, StanceSequence
 from manikin.control import ControlSettings, TaskWeights
@@ -323,11 +323,11 @@ def recorded_on_contacts(
 def _with_turning(carried: MotionOnContacts, recording: RecordedCom) -> RecordedCom:
     """Recording with a rate of the angular momentum that the body can follow.
 
-    First that of the recorded postures on their contacts; and then that of the postures which are fitted to
-    the plan it leads to, for the fit compromises between both.
+    First that of the recorded postures; and then that of the postures which are fitted to the plan it leads
+    to, for the fit compromises between both and the contacts.
     """
     body, scene, recorded = carried.body, carried.scene, (carried.own_time, carried.q)
-    recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
+    recording = recording.with_angular_momentum_rate(rate_as_recorded(body, recording, recorded))
     com = plan_near_recorded_com(body.mass, recording)
     if com.trajectory is None:
         return recording

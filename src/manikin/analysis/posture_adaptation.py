@@ -7,10 +7,11 @@ the tips of a foot kept off the surface. All this is our own.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from manikin.analysis.contact_adaptation import effector_placements
@@ -49,7 +50,7 @@ LARGEST_TILT, TILT_BEND = float(np.deg2rad(64.0)), float(np.deg2rad(3.0))
 of the bend of the tilt below it [rad]."""
 
 TILTING = 0.08
-"""Longest time over which the recorded tilt sets in [s]."""
+"""Longest time over which the recorded tilt sets in, and ceases where the heel comes down again [s]."""
 
 JOINING = 0.45
 """Share of a flight at either end in which it leaves, or joins, the recorded path."""
@@ -62,12 +63,15 @@ SIDEWAYS = 0.15
 """Importance of a flying foot's place to the side, as a share of that ahead and upward: a recorded foot may
 pass nearer to the other leg than the body's soles and shanks can."""
 
+HEIGHT = 3.0
+"""Importance of its height, as a multiple of that ahead: lifted feet shall not brush the ground."""
+
 SWING_HEIGHT, CUT_HEIGHT = 0.03, 0.02
 """Least height of a foot's lowest point in mid-flight, and at a clip's end that cuts a flight [m]."""
 
 ROUNDING, TOES_BACK = 0.005, 0.5
 """Width of the bend between a flight that is lifted to that height and one that is not [m], and share of the
-flight after which bent toes are straight again."""
+flight after which bent toes are straight again, and before which those that land bent are so still."""
 
 SAME_INSTANT = 1e-6
 """Times nearer to each other are one [s]."""
@@ -140,9 +144,10 @@ class _Path:
                 start, over = self.schedule.instants[[first + begin, first + end]]
                 # A contact that a clip's end cuts goes on: there is no hurry.
                 lasting = over - start if first + end < len(self.schedule.sequence) else np.inf
-                share = (self.time[rows] - start) / min(TILTING, lasting)
+                setting = min(TILTING, lasting)
                 angle = _up_to(LARGEST_TILT, np.maximum(tilt[rows] - rest, 0.0))
-                angle *= smooth_step(share) if begin > 0 else 1.0
+                angle *= smooth_step((self.time[rows] - start) / setting) if begin > 0 else 1.0
+                angle *= smooth_step((over - self.time[rows]) / setting) if end < len(contacts) else 1.0
                 turn = turn @ Rotation.from_rotvec(np.outer(angle, [0.0, 1.0, 0.0])).as_matrix()
                 place = place + contact.rotation_contact_to_world @ self.hinge - turn @ self.hinge
                 self.toes[rows] = angle
@@ -173,7 +178,9 @@ class _Path:
         self.rotation[rows] = Rotation.from_rotvec(turn).as_matrix() @ self.rotation[rows]
         self.position[rows] = place - self.rotation[rows] @ arm
         if leaves:
-            self.toes[rows] = self._straightening(first, share, TOES_BACK * (end - start))
+            self.toes[rows] += self._straightening(first - 1, -1, share, lasting)
+        if lands:
+            self.toes[rows] += self._straightening(stop, 1, 1.0 - share, lasting)
         near = np.maximum(share, 0.5 if not leaves else 0.0)
         near = np.clip(np.minimum(near, 0.5 if not lands else 1.0), 1e-6, 1.0 - 1e-6)
         self.weight[rows] = flight_weight(near, FLIGHT_POSITION, FLIGHT_END, FLIGHT_END)
@@ -184,15 +191,20 @@ class _Path:
             side /= np.linalg.norm(side, axis=1, keepdims=True)
             less = (1.0 - SIDEWAYS) * (1.0 - self.weight[rows]) / (1.0 - FLIGHT_POSITION)
             self.along[rows] -= less[:, None, None] * side[:, :, None] * side[:, None, :]
+            self.along[rows, 2, 2] *= np.minimum(HEIGHT, 1.0 / self.weight[rows])
         if all(contact.kind is ContactKind.GRASP for contact in self._contacts()):
             self.rotation_weight[rows] = GRASP_ROTATION_WEIGHT
 
-    def _straightening(self, first: int, share: FloatArray, lasting: float) -> FloatArray:
-        """Angle of the toes after a lift-off: it goes on as it came, and then back to straight [rad]."""
-        before, angle = max(first - 2, 0), self.toes[first - 1]
-        rate = (angle - self.toes[before]) / max(self.time[first - 1] - self.time[before], 1e-9)
+    def _straightening(self, at: int, inward: int, share: FloatArray, lasting: float) -> FloatArray:
+        """Angle of the toes in a flight of a duration [s] beside the contact at a sample [rad].
+
+        It goes on as it came, and then back to straight; before a landing on the toes, the other way round.
+        The next sample of the contact is ``inward``; shares of the flight are (n,) since that contact.
+        """
+        inside, angle = min(max(at + inward, 0), len(self.time) - 1), self.toes[at]
+        rate = (angle - self.toes[inside]) / max(abs(self.time[at] - self.time[inside]), 1e-9)
         gone = np.clip(share / TOES_BACK, 0.0, 1.0)
-        found = angle * (1.0 - smooth_step(gone)) + rate * lasting * gone * (1.0 - gone) ** 2
+        found = angle * (1.0 - smooth_step(gone)) + rate * TOES_BACK * lasting * gone * (1.0 - gone) ** 2
         return _up_to(LARGEST_TILT, np.maximum(found, 0.0))
 
     def _lift(self, rows: slice, near: FloatArray, share: FloatArray, cut: tuple[bool, bool]) -> None:
@@ -259,12 +271,13 @@ spline is cheap."""
 UNSURE = 0.1
 """Time at both ends in which accelerations of a recording are not known well [s]."""
 
-SCALES = FitScales(rest=1e6, force=8.0, moment_share=0.25, acceleration=16.0, pelvis_acceleration=8.0)
-"""Scales of the fit. A recording need not begin or end at rest, and a rate of angular momentum of 5 N.m
-costs one unit, for the centre of mass is planned as that of a point mass."""
-
-LOOSE = replace(SCALES, moment_share=1e3, force=1e3, com=0.01)
-"""Scales of a fit without dynamics."""
+SCALES = FitScales(
+    rest=1e6, force=8.0, moment_share=0.25, acceleration=16.0, pelvis_acceleration=8.0, torque_share=0.05,
+    strength_share=0.9,
+)  # fmt: skip
+"""Scales of the fit. A recording need not begin or end at rest, and a rate of angular momentum of 2.5 N.m
+costs one unit, for the centre of mass is planned as that of a point mass. A twentieth of a joint's strength
+costs as much: beyond it there is no execution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -304,23 +317,18 @@ def adapt_postures(
     return AdaptedMotion(motion, certificate, float(np.sqrt(np.mean(away**2))))
 
 
-def rate_on_contacts(
-    body: BodyModel, scene: Scene, recording: RecordedCom, recorded: tuple[FloatArray, FloatArray]
+def rate_as_recorded(
+    body: BodyModel, recording: RecordedCom, recorded: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
-    """(n, 3) rate of the angular momentum of recorded postures put on exact contacts [N.m].
+    """(n, 3) rate of the angular momentum of recorded postures at a recording's samples [N.m].
 
-    At a recording's samples. Soles that stay in place and land flat make legs swing a little
-    otherwise than they were recorded, and with them the rest of the body.
+    That of the same postures put on exact contacts, with nothing that makes up for the legs, was up to five
+    times as large in walks: a plan for it throws trunk and arms about.
     """
-    clock = recording.key_times, recording.key_times
-    task = _Task.of(body, scene, recording.schedule, recorded, clock)
-    velocity = np.gradient(recording.com, recording.time, axis=0, edge_order=2)
-    second = np.gradient(velocity, recording.time, axis=0, edge_order=2)
-    com, acceleration = (
-        np.column_stack([np.interp(task.time, recording.time, column) for column in values.T])
-        for values in (recording.com, second)
-    )
-    spline = task.fit(com, acceleration, np.zeros_like(com), LOOSE)
+    job = FitJob(KNOT_SPACING)
+    knots = job.knots(recording.schedule)
+    time, basis = job.samples(knots)
+    spline = spline_through(_postures(recorded, time), basis, knots)
     return centroidal_motion(body, *spline.evaluate(recording.time)).angular_momentum_rate
 
 
@@ -372,16 +380,11 @@ class _Task:
 
     def follow(self, trajectory: CentroidalTrajectory) -> ConfigurationSpline:
         """Fit to a planned centre of mass and its angular momentum."""
-        return self.fit(
-            trajectory.position(self.time), trajectory.acceleration(self.time),
-            trajectory.angular_momentum_rate(self.time), SCALES,
+        goal = _AdaptationGoal(
+            self, trajectory.position(self.time), trajectory.acceleration(self.time),
+            trajectory.angular_momentum_rate(self.time),
         )  # fmt: skip
-
-    def fit(
-        self, com: FloatArray, acceleration: FloatArray, turning: FloatArray, scales: FitScales
-    ) -> ConfigurationSpline:
-        """Fit to a centre of mass [m], its acceleration and a rate of angular momentum [N.m], (n, 3) each."""
-        return self.job.solve(_AdaptationGoal(self, com, acceleration, turning), scales, FINE)[1].spline
+        return self.job.solve(goal, SCALES, FINE)[1].spline
 
 
 @dataclass(frozen=True, eq=False)
@@ -407,7 +410,7 @@ class _AdaptationGoal:
             time=time, schedule=task.schedule, effectors=task.paths.targets, com=self.com,
             com_weight=np.ones(len(time)), com_acceleration=self.acceleration, margin=np.zeros(len(time)),
             reference=task.reference, reference_scale=task.scale, ignored=task.ignored, turning=self.turning,
-            reference_second=_steady_ends(time, basis.evaluate(start.control_points, 2)), strength=False,
+            reference_second=_steady_ends(time, basis.evaluate(start.control_points, 2)),
         )  # fmt: skip
         return MotionObjective(task.body, task.proximity, targets, basis)
 
@@ -433,5 +436,6 @@ def _steady_ends(time: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def _postures(recorded: tuple[FloatArray, FloatArray], time: FloatArray) -> FloatArray:
-    """(n, nq) postures between the recorded ones."""
-    return Guide(recorded[0], align_quaternions(np.array(recorded[1])), ()).at(time)
+    """(n, nq) postures between the recorded ones, smooth in time: kinks of a slow camera are no motion."""
+    instants, postures = recorded[0], align_quaternions(np.array(recorded[1]))
+    return Guide(instants, postures, (), CubicSpline(instants, postures).derivative()(instants)).at(time)

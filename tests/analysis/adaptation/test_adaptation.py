@@ -321,6 +321,26 @@ def test_a_foot_tilts_on_its_toes_as_far_as_it_was_recorded_to(walk):
     assert min(tilts) > 35.0
 
 
+def test_who_lands_on_the_toes_comes_down_to_the_sole_without_a_jump(nod):
+    """Toes are bent when they land under a foot of 20 degrees, whose heel is down when it counts."""
+    body, tilted = nod.body, np.deg2rad(20.0)
+    (whole, toes), time = (phase.stance for phase in rolling(0.5, 0.5).sequence), np.linspace(0.0, 1.0, 201)
+    other = replace(next(iter(whole)), effector="right_foot", position=np.array([0.0, -0.2, 0.0]))
+    stances = [Stance([other, *held], 2000.0) for held in ((), toes, whole)]
+    phases = [Phase(stance, d, d) for stance, d in zip(stances, (0.4, 0.3, 0.3), strict=True)]
+    schedule = ContactSchedule(StanceSequence(phases), [0.0, 0.4, 0.7, 1.0])
+    q = np.tile(body.standing_posture(), (len(time), 1))
+    q[time < 0.7, 3:7] = [0.0, np.sin(0.5 * tilted), 0.0, np.cos(0.5 * tilted)]
+    paths = effector_paths(body, schedule, time, q)
+    pitch = np.arcsin(-paths.targets["left_foot"].rotation[:, 2, 0])
+    bent = paths.toes[body.joint_index("left_toe_extension")]
+    assert bent[time.searchsorted(0.4)] == pytest.approx(tilted, abs=1e-6)
+    for angle in (bent, pitch):
+        assert np.abs(np.diff(angle)).max() < 0.15 * tilted
+    assert bent[0] == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(pitch[time >= 0.7]).max() < 1e-9
+
+
 def test_toes_carry_only_what_they_are_strong_enough_for(walk):
     """A load of 1.4 body weights at the tip of a shortened sole asks for the toes' strength."""
     found, supports = walk
