@@ -73,6 +73,9 @@ ROUNDING, TOES_BACK = 0.005, 0.5
 """Width of the bend between a flight that is lifted to that height and one that is not [m], and share of the
 flight after which bent toes are straight again, and before which those that land bent are so still."""
 
+STEPPING = 0.4
+"""Share of a flight in which the height of the ground below it changes from one contact's to the next's."""
+
 SAME_INSTANT = 1e-6
 """Times nearer to each other are one [s]."""
 
@@ -217,7 +220,7 @@ class _Path:
         height, hinge = self.position[rows, 2], 0.0 if self.hinge is None else float(self.hinge[0])
         ball = height - hinge * np.sin(tilt)
         tips = ball - (half - hinge) * np.sin(tilt - self.toes[rows])
-        surface = min(c.position[2] for c in self._contacts())
+        surface = self._surface(rows, share)
         low = np.minimum(np.minimum(height + half * np.sin(tilt), ball), tips) - surface
         wanted = SWING_HEIGHT * np.minimum(1.0, 4.0 * near)
         for is_cut, at, away in zip(cut, (0, -1), (share, 1.0 - share), strict=True):
@@ -226,6 +229,19 @@ class _Path:
                 wanted = np.minimum(wanted, least + (SWING_HEIGHT - least) * np.minimum(1.0, 4.0 * away))
         lift = ROUNDING * np.logaddexp(0.0, (wanted - low) / ROUNDING)
         self.position[rows, 2] += lift * np.minimum(1.0, 8.0 * near)
+
+    def _surface(self, rows: slice, share: FloatArray) -> FloatArray:
+        """(n,) height that a foot keeps above in a flight [m]: that of the contact it leaves, or will make.
+
+        A higher one counts from early on, a lower one late; at a clip's end the one that there is.
+        """
+        last, coming = self.phases[[max(rows.start - 1, 0), min(rows.stop, len(self.time) - 1)]].tolist()
+        stances = [phase.stance for phase in self.schedule.sequence]
+        before = [stance[self.name] for stance in stances[: last + 1] if self.name in stance][-1:]
+        after = [stance[self.name] for stance in stances[coming:] if self.name in stance][:1]
+        left, made = (contact.position[2] for contact in ((before or after)[0], (after or before)[0]))
+        passed = smooth_step(share / STEPPING if made > left else 1.0 - (1.0 - share) / STEPPING)
+        return left + (made - left) * passed
 
     def _contacts(self) -> Iterator[Contact]:
         for phase in self.schedule.sequence:

@@ -21,7 +21,7 @@ from manikin.analysis.contact_adaptation import (
     within_toe_strength,
     without_remnants,
 )
-from manikin.analysis.posture_adaptation import CUT_HEIGHT, effector_paths
+from manikin.analysis.posture_adaptation import CUT_HEIGHT, SWING_HEIGHT, effector_paths
 from manikin.balance import pseudo_wrench, wrench_polytope
 from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, sole
 from manikin.errors import InputError
@@ -339,6 +339,24 @@ def test_who_lands_on_the_toes_comes_down_to_the_sole_without_a_jump(nod):
         assert np.abs(np.diff(angle)).max() < 0.15 * tilted
     assert bent[0] == pytest.approx(0.0, abs=1e-9)
     assert np.abs(pitch[time >= 0.7]).max() < 1e-9
+
+
+@pytest.mark.parametrize("heights", [(0.0, 0.2), (0.2, 0.0)])
+def test_a_foot_flies_above_the_higher_of_the_floors_that_it_goes_between(nod, heights):
+    """Level all the time, it is 3 cm above a step of 20 cm from before to after the middle of its flight."""
+    body, time = nod.body, np.linspace(0.0, 1.0, 201)
+    feet = [
+        sole("left_foot", (0.4 * number, 0.0, height), length=0.26, width=0.11, friction=0.8)
+        for number, height in enumerate(heights)
+    ]
+    other = replace(feet[0], effector="right_foot", position=np.array([0.0, -0.2, 0.0]))
+    stances = [Stance([other, *held], 2000.0) for held in (feet[:1], (), feet[1:])]
+    phases = [Phase(stance, d, d) for stance, d in zip(stances, (0.2, 0.6, 0.2), strict=True)]
+    schedule = ContactSchedule(StanceSequence(phases), [0.0, 0.2, 0.8, 1.0])
+    paths = effector_paths(body, schedule, time, np.tile(body.standing_posture(), (len(time), 1)))
+    height = paths.targets["left_foot"].position[:, 2]
+    assert height[[0, -1]] == pytest.approx(heights)
+    assert np.all(height[(time > 0.45) & (time < 0.55)] > 0.2 + SWING_HEIGHT - 1e-3)
 
 
 def test_toes_carry_only_what_they_are_strong_enough_for(walk):
