@@ -244,7 +244,8 @@ def execute_motion(
     supports = SupportSettings(friction_share=scenario.friction_share)
     # What follows a walk is where it is, and no plan of steps.
     stepping = ShiftSettings(room=planned.room) if planned.walked >= planned.end else None
-    settings = ControlSettings(supports=supports)
+    # Feet of a walk land at speed, and their toes bounce.
+    settings = ControlSettings(supports=supports, watch_toes=planned.walked > -np.inf)
     disturbed = replace(settings, returning=ReturnSettings(), stepping=stepping)
     if scenario.file.push is not None:
         settings = disturbed
