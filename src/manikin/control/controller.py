@@ -1,9 +1,12 @@
 """Weighted multi-task control of a planned motion ([Qiu2012]_ 6.3)."""
 
+import math
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, with_root
@@ -139,6 +142,8 @@ class Controller:
         stepping = self.settings.stepping
         self.shift = None if stepping is None else ShiftedPlan(schedule, stepping, self.settings.period)
         self._previous = np.zeros(joints)
+        pending = math.ceil(self.settings.lead / self.settings.period)
+        self._decided = deque[FloatArray](maxlen=max(1, pending))
         self._carried: dict[str, float] = {}
 
     def step(
@@ -153,9 +158,9 @@ class Controller:
             touching: Whether each effector is felt to touch; the schedule is trusted where it says nothing.
         """
         clock, waited, rate = self.clock, self.clock.waited, self.clock.rate
-        time = clock.at(time)
+        time = clock.at(time) + self.settings.lead
         supports = self._switch.update(time, touching)
-        state = self._dynamics.evaluate(q, v, self.carried_at(time))
+        state = self._dynamics.evaluate(*self._foreseen(q, v), self.carried_at(time))
         # Where the plan is at its own time, which passes now, and how far the body is from it.
         reference, deviation = self.reference.sample(time, rate, rate), None
         if self.shift is not None:
@@ -172,6 +177,7 @@ class Controller:
         if solution is not None:
             x, iterations = solution.x, solution.iterations
             self._previous = problem.torque(x)
+            self._decided.append(problem.acceleration(x).copy())
             for name, load in problem.normal_forces(x).items():  # what it carries until its unloading begins
                 if supports[name].unload_share >= 1.0:
                     self._carried[name] = load
@@ -179,6 +185,15 @@ class Controller:
             self._previous, problem.acceleration(x).copy(), problem.wrenches(x), supports, fallback, state,
             reference, problem, iterations, waited,
         )  # fmt: skip
+
+    def _foreseen(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The state when the torques that are decided on now act, by the accelerations decided on."""
+        lead = self.settings.lead
+        if lead == 0.0 or not self._decided:
+            return q, v
+        before = np.mean(self._decided, axis=0)
+        way = lead * v + 0.5 * lead**2 * before
+        return pin.integrate(self.body.pinocchio, q, way), v + lead * before
 
     def carried_at(self, time: float) -> Mapping[str, float]:
         """Point masses [kg] that effectors carry at a time of the plan [s]."""

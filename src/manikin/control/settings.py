@@ -239,6 +239,8 @@ class ControlSettings:
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
         returning: What to do when the body is off its plan; None follows the plan as ever.
         stepping: How the steps of a walk are moved when the body is off its plan; None never moves them.
+        lead: Time by which torques are believed to act later than they are asked for [s]: they are those of
+            the state that is foreseen for then.
         watch_toes: Whether toes that bounce off as a foot lands carry nothing until they are down again, and
             come down fast, by torques that know their inertia in the engine; for motions that land at speed.
     """
@@ -251,8 +253,10 @@ class ControlSettings:
     max_joint_acceleration: float = 500.0
     returning: ReturnSettings | None = None
     stepping: ShiftSettings | None = None
+    lead: float = 0.0
     watch_toes: bool = False
 
     def __post_init__(self) -> None:
         for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):
             finite_number(getattr(self, name), f"control setting {name!r}", above=0.0)
+        finite_number(self.lead, "control setting 'lead'", at_least=0.0)

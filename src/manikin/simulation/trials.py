@@ -99,6 +99,8 @@ def run_trials(
 ) -> Trials:  # fmt: skip
     """Execute a plan in worlds drawn from an uncertainty.
 
+    Control knows of it that torques act later than they are asked for, by half of the longest delay.
+
     Args:
         count: Worlds, at least one.
         uncertainty: How far they are from the believed one; the default uncertainty when omitted.
@@ -107,7 +109,9 @@ def run_trials(
         progress: Called with the share of the worlds that are done.
     """
     drawn = np.random.default_rng(seed).integers(2**32, size=count).tolist()
-    items = [_World(task.bare(), uncertainty or Uncertainty(), number) for number in drawn]
+    uncertainty = uncertainty or Uncertainty()
+    told = replace(task.bare(), settings=replace(task.settings, lead=0.5 * uncertainty.delay_s))
+    items = [_World(told, uncertainty, number) for number in drawn]
     found: dict[int, Trial] = {}
     for number, trial in side_by_side(_tried, items, workers, "trials"):
         found[number] = trial
