@@ -337,9 +337,11 @@ class _Sections:
             self._ball("pelvis", group, Material.TROUSERS, "leg", (-0.060, 0.076, -0.030),
                        (0.072, 0.078, 0.086)),
         ]  # fmt: skip
-        height = (shoulder[2] - 0.115 * self.size) / self.size
-        chest = (0.085, 0.080, height) if woman else (0.076, 0.075, height + 0.02)
-        halves = (0.058, 0.064, 0.062) if woman else (0.046, 0.075, 0.055)
+        if not woman:
+            return parts
+        # The chest of a slim trunk lies farther back.
+        deep, height = self._fat("trunk") / self.size, (shoulder[2] - 0.115 * self.size) / self.size
+        chest, halves = (0.085 * deep, 0.080, height), (0.058, 0.064, 0.062)
         return [*parts, self._ball("thorax", group, shirt, "trunk", chest, halves)]
 
     def _head(self) -> list[Loft]:
