@@ -83,11 +83,11 @@ def test_the_example_prints_what_the_readme_says(tmp_path, monkeypatch, capsys, 
 
     Its run is the one that the tests share, in a process of its own as that of the example.
     """
+    result = runs("platform")
 
     def shared(job, *, out, seed):
         assert job.to_yaml() == load_scenario("platform").to_yaml()
         assert seed is None
-        result = runs("platform")
         shutil.copytree(result.directory, out)
         return result
 
