@@ -131,10 +131,11 @@ def rising_at_once(
 
 
 def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
-    """Stances with toes that carry no farther from their hinge than their strength allows.
+    """Stances with toes that carry no farther from their hinge, and no more, than their strength allows.
 
     Whoever stands on the toes of one foot has the centre of pressure at most the toes' torque limit over the
-    load ahead of the hinge; the rest of their length is no support.
+    load ahead of the hinge; the rest of their length is no support. A foot on its toes alone carries no more
+    than that load (:data:`TOE_LOAD`): the ankle that pushes off with it is about as strong.
     """
     return schedule.with_contacts(lambda contact: _strong_part(contact, body))
 
@@ -201,10 +202,14 @@ def _strong_part(contact: Contact, body: BodyModel) -> Contact:
     if contact.kind is not ContactKind.SOLE or contact.part is SolePart.HEEL or toes is None or line is None:
         return contact
     strength = -float(body.torque_lower[body.joint_index(toes.hinges[0].name)])
-    reach = line + strength / (TOE_LOAD * body.mass * GRAVITY)
+    load = TOE_LOAD * body.mass * GRAVITY
+    reach = line + strength / load
     points = np.array(contact.points)
     points[:, 0] = np.minimum(points[:, 0], reach)
-    return replace(contact, points=frozen_array(points, "toe points", (None, 3)))
+    strong = replace(contact, points=frozen_array(points, "toe points", (None, 3)))
+    if contact.part is SolePart.FULL:
+        return strong
+    return replace(strong, normal_force_cap=min(contact.normal_force_cap or np.inf, load))
 
 
 def _whole(contact: Contact, body: BodyModel) -> Contact:

@@ -369,6 +369,8 @@ def test_toes_carry_only_what_they_are_strong_enough_for(walk):
         for contact in phase.stance:
             ahead = contact.points[:, 0].max() - toe_hinge(body, contact.effector)[0]
             assert ahead == pytest.approx(lever, abs=1e-9)
+            if contact.part is SolePart.TOES:
+                assert contact.normal_force_cap == pytest.approx(1.4 * body.mass * GRAVITY)
 
 
 def test_planned_timing_free_double_supports_last_longer(walk):
