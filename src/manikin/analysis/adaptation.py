@@ -131,11 +131,11 @@ def farthest_support(recording: RecordedCom) -> float:
     return float(max(distances))
 
 
-SETTINGS = ControlSettings(period=0.002, weights=TaskWeights(com=3e5, posture=60.0), watch_toes=True)
+SETTINGS = ControlSettings(period=0.002, weights=TaskWeights(flying=5e3, posture=60.0), watch_toes=True)
 """Settings of the execution. A recorded posture is worth six times as much as one that was only preferred:
-that keeps arms off the trunk while they make up for what the contacts do not give. The centre of mass counts
-more than feet in flight: where a hip was too weak for a swing, the body was thrown up after its foot, off the
-ground. Feet land at speed: one
+that keeps arms off the trunk while they make up for what the contacts do not give. Feet in flight
+count less than the centre of mass, and those that stand more: where a hip was too weak for a swing, the body
+was thrown up after its foot, off the ground. Feet land at speed: one
 that bounces off by a hair is pushed down at 1 m/s if the torques of its load are held for 5 ms."""
 
 

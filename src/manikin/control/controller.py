@@ -290,6 +290,7 @@ class Controller:
         landing = support.mode is SupportMode.LANDING
         target = landing_reference(support, planned) if landing else lifted(planned, support)
         follow, point = 1.0 if landing else support.follow, name in self._points
+        weight = self.settings.weights.flying
         return swing_task(name, frame, target, gains.swing, weight, follow, point=point)
 
     def _loaded(

@@ -16,6 +16,7 @@ class TaskWeights:
         com: Centre of mass [1/(m/s^2)^2].
         effectors: Placement of feet and grasping hands; also the hinges of toes, with their
             feet's gains in flight and those of the posture on the ground.
+        flying: Placement of effectors on their way, which count as much by default.
         pelvis: Orientation of the pelvis.
         posture: Each joint angle.
         angular_momentum: Rate of the angular momentum [1/(N.m)^2]; 0, as in the thesis, leaves it free.
@@ -27,6 +28,7 @@ class TaskWeights:
 
     com: float = 2e4
     effectors: float = 5e4
+    flying: float = 5e4
     pelvis: float = 1e4
     posture: float = 10.0
     angular_momentum: float = 0.0
@@ -35,7 +37,7 @@ class TaskWeights:
     planned_force: float = 0.03
 
     def __post_init__(self) -> None:
-        for name in ("com", "effectors", "pelvis", "posture", "angular_momentum", "planned_force"):
+        for name in ("com", "effectors", "flying", "pelvis", "posture", "angular_momentum", "planned_force"):
             finite_number(getattr(self, name), f"task weight {name!r}", at_least=0.0)
         for name in ("acceleration", "force"):
             finite_number(getattr(self, name), f"task weight {name!r}", above=0.0)
