@@ -74,28 +74,30 @@ as one more key frame where the plan strays by more than 1 cm. Feet stand on the
 toes once the heel has lifted.
 
 A walker is no point mass: a plan without angular momentum leaves it to the arms to cancel that of the legs.
-So the recorded postures are first put on the exact contacts, without regard to dynamics, and a plan takes
-over the rate of their angular momentum (4.51), changed as little as balance asks for. The postures fitted to
-that plan give way between both; their own rate is what a second plan, the one that counts, is made with. The
+So a plan takes over the rate of the recorded postures' angular momentum (4.51), changed as little as balance
+asks for. The postures fitted to that plan and to the exact contacts give way between both; their own rate is
+what a second plan, the one that counts, is made with. The
 margin, about the world origin, is the lesser one of the point mass and of the body that turns; the latter is
 asked for with 8 N.m to spare, and 20 N.m more are wished for and paid for where they lack: a plan on the
 edge of the soles leaves a controller nothing to come back with. Several things adapt the recorded contacts
 to a body with stiff segments: a heel lands with the whole sole; a foot leaves once the hinge of its toes has
 moved by 2 cm, at most 0.1 s early (it rolls over the tips, which ours cannot); a seat is left once the
 buttocks are 1.5 cm above it, as flesh and cushion follow and a block does not; what a clip's end cuts of a
-foot's part to less than 80 ms is as beside; and soles end where a load of 1.4 body weights asks for the
-strength of the toes.
+foot's part to less than 80 ms is as beside; and soles end where a load of 1.4 body weights, which is also
+the most that a foot on its toes carries, asks for the strength of the toes.
 
 """
 EXECUTED = """
 ## Executed
 
 The recorded postures are adapted to that CoM, its angular momentum and the exact stances in one smooth fit
-(postures and accelerations near the recorded ones, feet, CoM, distances), and the controller executes the
-result at the recorded speed from the first frame to the last, or one step before it where it would be
-stopped dead. *Posture*: root mean square deviation of all hinges from the recording, without the toes,
-which no marker shows. *Torque*: largest share of a joint's strength in the plan. *Balanced*: share of the
-control steps with a positive margin of the measured contact forces. CoM and feet: errors from the plan.
+(postures and accelerations near the recorded ones, feet, CoM, distances, strength), and the controller
+executes the result at the recorded speed from the first frame to the last, or one step before it where it
+would be stopped dead. *Posture*: root mean square deviation of all hinges from the recording, without the
+toes, which no marker shows. *Torque*: largest share of a joint's strength in the plan. *Balanced*: share of
+the control steps with a positive margin of the measured contact forces. CoM and feet: errors from the plan.
+The figures are from before plans minded the strength and began from the recorded angular momentum
+([adapted recordings](adaptation.md) tell what changed), and were not measured again since.
 
 """
 NOTES = """
