@@ -37,9 +37,8 @@ def main() -> None:
     lands = sorted(step.lands for step in stepped.footprints.of("left_foot"))
     begin = next(time for time in lands if time > 2.3)
     end = next(step.lands for step in stepped.footprints.of("right_foot") if step.lands > begin)
-    settings = ControlSettings(
-        returning=ReturnSettings(), stepping=None if options.unmoved else ShiftSettings()
-    )
+    stepping = None if options.unmoved else ShiftSettings()
+    settings = ControlSettings(returning=ReturnSettings(), stepping=stepping, watch_toes=True)
     held = []
     for phase in options.phases:
         for direction in options.directions:
