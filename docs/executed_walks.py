@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from manikin.body import human
+from manikin.control import ControlSettings
 from manikin.scenarios import load_scenario
 from manikin.scene import Scene
 from manikin.simulation import Execution, execute
@@ -83,8 +84,9 @@ def walked(velocity: tuple[float, float, float], scene: Scene) -> Walked:
     body, fastest = human(), float(np.abs(velocity).max())
     path = SteadyWalk(np.array(velocity), HOLD, max(0.8, fastest / RAMP))
     stepped = step_along(path)
-    walk = balanced_walk(body, stepped)
-    return Walked(velocity, path, stepped, execute(body, scene, walk.motion, walk.schedule, hold=0.3))
+    walk, settings = balanced_walk(body, stepped), ControlSettings(watch_toes=True)
+    found = execute(body, scene, walk.motion, walk.schedule, settings=settings, hold=0.3)
+    return Walked(velocity, path, stepped, found)
 
 
 def outcome(name: str, walk: Walked) -> str:

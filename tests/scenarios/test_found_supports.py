@@ -209,6 +209,20 @@ def test_a_walk_without_a_plan_of_the_centre_of_mass_rests_there_then_everywhere
     assert slower(there, report, 3) is there.resting
 
 
+def test_a_walk_that_fails_at_a_second_place_rests_there_too(paced):
+    """Where more than half of its stages have rests already, it rests at all of them."""
+    quick, report = paced
+    last = len(quick.plan.stages) - 1
+    report.fail("centroidal", "the largest margin found is 2.07 N.m", 1.0, "phase 1")
+    there = slower(quick, report, 1)
+    report.fail("centroidal", "the largest margin found is 2.07 N.m", 3.0, f"phase {last}")
+    both = slower(there, report, last)
+    assert rests(there) < rests(both) < rests(quick.resting)
+    report.fail("centroidal", "the largest margin found is 2.07 N.m", 2.0, "phase 4")
+    full = slower(both, report, last // 2)
+    assert full is both.resting or rests(both) < rests(full)
+
+
 def test_where_a_posture_is_missing_feet_are_flat_before_the_body_rests_everywhere(paced):
     """More time is no help then."""
     walking, report = paced

@@ -26,6 +26,7 @@ from manikin.analysis.posture_adaptation import AdaptedMotion, adapt_postures, r
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, StanceSequence
 from manikin.control import ControlSettings, TaskWeights
+from manikin.control.settings import Impedance
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
@@ -131,12 +132,15 @@ def farthest_support(recording: RecordedCom) -> float:
     return float(max(distances))
 
 
-SETTINGS = ControlSettings(period=0.002, weights=TaskWeights(flying=5e3, posture=60.0), watch_toes=True)
+SETTINGS = ControlSettings(
+    period=0.002, weights=TaskWeights(flying=5e3, posture=60.0), watch_toes=True,
+    toes_back=Impedance(1e4, 250.0),
+)  # fmt: skip
 """Settings of the execution. A recorded posture is worth six times as much as one that was only preferred:
-that keeps arms off the trunk while they make up for what the contacts do not give. Feet in flight
-count less than the centre of mass, and those that stand more: where a hip was too weak for a swing, the body
-was thrown up after its foot, off the ground. Feet land at speed: one
-that bounces off by a hair is pushed down at 1 m/s if the torques of its load are held for 5 ms."""
+that keeps arms off the trunk while they make up for what the contacts do not give. Feet in flight count less
+than the centre of mass, and those that stand more: where a hip was too weak for a swing, the body was thrown
+up after its foot, off the ground. Feet land at speed: one that bounces off by a hair is pushed down at 1 m/s
+if the torques of its load are held for 5 ms."""
 
 
 @dataclass(frozen=True, eq=False)

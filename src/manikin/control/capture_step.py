@@ -182,8 +182,7 @@ class ShiftedPlan:
         if room is None:
             return target
         offsets = target + np.linspace(0.0, 1.0, TRIED)[:, None] * (offset - target)
-        yaw = _yaw(landing.rotation_contact_to_world)
-        places = np.column_stack([landing.position[:2] + offsets, np.full(TRIED, yaw)])
+        places = np.column_stack([landing.position[:2] + offsets, np.full(TRIED, landing.yaw)])
         free = room.beside(np.append(now.position[:2] + offset, _yaw(now.rotation)), places)
         return offsets[np.argmax(free >= min(self._settings.nearest, free[-1]))]
 

@@ -20,7 +20,7 @@ from manikin.control.edge_forces import ContactGeometry, contact_geometry, segme
 from manikin.control.partings import SelfWatch
 from manikin.control.plan_return import Deviation, PlanClock, deviation_from_plan, returning_acceleration
 from manikin.control.reference import Reference, ReferenceSample
-from manikin.control.settings import ControlSettings, Impedance
+from manikin.control.settings import ControlSettings
 from manikin.control.supports import SupportMode, SupportState, SupportSwitch
 from manikin.control.tasks import AccelerationTask, ForceWish, landing_reference, lifted, swing_task
 from manikin.motion import Motion
@@ -42,9 +42,6 @@ ROUNDING = 1e-6
 
 RAISED_TOES, BOUNCED = 0.001, 0.05
 """The same of the tips of toes [m], and their angle from the plan from which they have bounced off [rad]."""
-
-TOES_BACK = Impedance(10000.0, 250.0)
-"""Gains with which toes that have bounced off come down: the edge behind their hinge jams on the floor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +238,7 @@ class Controller:
             gain = gains.posture if supports[name].mode is SupportMode.STANCE else gains.swing
             if self.settings.watch_toes and supports[name].mode is SupportMode.STANCE:
                 away = np.abs(state.q[7:][toes] - reference.q[7:][toes])
-                gain = TOES_BACK if away.max(initial=0.0) > BOUNCED else gain
+                gain = self.settings.toes_back if away.max(initial=0.0) > BOUNCED else gain
             if toes:
                 wanted.append(
                     tasks.posture_task(f"toes of {name}", state, reference, gain, weights.effectors, toes)

@@ -199,7 +199,7 @@ class ShiftSettings:
     Attributes:
         threshold: Deviation of the capture point, on one foot, from which the plan takes it over [m].
         filtering: Time constant with which that deviation is smoothed [s]: landings and noise pass.
-        ankle: How far the pressure under the standing foot is moved along it against that at most [m].
+        ankle: How far the pressure under the standing foot is moved along it at most, to hold the body [m].
         ankle_across: The same across it [m].
         latest: A foot is not moved later than this before its landing [s].
         narrowest: Least distance of a moved landing from the standing foot, across that [m].
@@ -245,6 +245,8 @@ class ControlSettings:
             the state that is foreseen for then.
         watch_toes: Whether toes that bounce off as a foot lands carry nothing until they are down again, and
             come down fast, by torques that know their inertia in the engine; for motions that land at speed.
+        toes_back: Gains with which they come down: the edge behind their hinge jams on the floor. With four
+            times the stiffness a walk at 1.5 m/s fell.
     """
 
     period: float = 0.005
@@ -257,6 +259,7 @@ class ControlSettings:
     stepping: ShiftSettings | None = None
     lead: float = 0.0
     watch_toes: bool = False
+    toes_back: Impedance = Impedance(2500.0, 100.0)
 
     def __post_init__(self) -> None:
         for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):
