@@ -54,7 +54,7 @@ LOW_STEP = 0.05  # distance of places on a way for one who crawls [m]
 LOW_RISE = 0.2  # largest difference in height of its cells [m]
 WIDEST = 3.0  # widest gap that is told as the reason why no way leads to the goal [m]
 BETWEEN = np.array([0.2, 0.4, 0.6, 0.8])  # shares of such a way at which nothing may stand in it
-GREED = ((1.4, 200), (2.0, 800), (4.0, 20_000))
+GREED = ((1.8, 300), (2.4, 800), (4.0, 20_000))
 """Factors on the estimate, tried in turn, each with the footholds that may be expanded with it.  They bound
 no cost: the estimate counts turns, and may be more than the least cost."""
 FAR = 20.0  # estimate of the cost from which on the first factor is left out [s]; our choice
