@@ -86,7 +86,7 @@ class LimbSamples:
         return hull_of(self.limb, self.segment, self.positions + self.origin)
 
 
-_SINGLE = 1e-4  # what rounding to single precision takes at most, 1,000 m away [m, 1]
+SINGLE = 1e-4  # what rounding to single precision takes at most, 1,000 m away [m, 1]
 _LEAF = 16  # largest number of samples in a leaf
 
 
@@ -96,8 +96,7 @@ class SampleLeaves:
 
     Attributes:
         rows: (l, k) rows of the samples.
-        positions: (l, 3, k) of the effector [m].
-        upward: (l, 3, k) its z axes; NaN for what only fills a group up.
+        positions: (l, 3, k) of the effector in single precision [m]; NaN for what only fills a group up.
         centres: (3, l) middle of the box about the positions [m], in single precision.
         radii: (l,) of a ball about it that holds them with what is lost by that [m].
         axes: (3, l) unit direction in the middle of the z axes.
@@ -105,8 +104,7 @@ class SampleLeaves:
     """
 
     rows: NDArray[np.int64]
-    positions: FloatArray
-    upward: FloatArray
+    positions: NDArray[np.float32]
     centres: NDArray[np.float32]
     radii: NDArray[np.float32]
     axes: NDArray[np.float32]
@@ -129,14 +127,13 @@ class SampleLeaves:
         real, rows = rows < len(positions), rows % len(positions)
         places, directions = positions[rows], upward[rows]
         centres = 0.5 * (places.min(axis=1) + places.max(axis=1))
-        radii = np.sqrt(((places - centres[:, None]) ** 2).sum(axis=2).max(axis=1)) + _SINGLE
+        radii = np.sqrt(((places - centres[:, None]) ** 2).sum(axis=2).max(axis=1)) + SINGLE
         axes = unit(directions.mean(axis=1), 1e-12)
         cosines = np.einsum("lki,li->lk", directions, axes).min(axis=1)
-        spreads = np.arccos(np.clip(cosines, -1.0, 1.0)) + _SINGLE
-        directions[~real] = np.nan
-        exact = [np.ascontiguousarray(item.transpose(0, 2, 1)) for item in (places, directions)]
+        spreads = np.arccos(np.clip(cosines, -1.0, 1.0)) + SINGLE
+        places[~real] = np.nan
         rough = [np.asarray(item.T, np.float32, order="C") for item in (centres, radii, axes, spreads)]
-        return SampleLeaves(rows, exact[0], exact[1], *rough)
+        return SampleLeaves(rows, np.asarray(places.transpose(0, 2, 1), np.float32, order="C"), *rough)
 
 
 def manipulability(products: FloatArray) -> FloatArray:

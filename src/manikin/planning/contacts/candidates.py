@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from manikin.body import Configuration, Limb, limb_placement
-from manikin.kinematics.limb_samples import LimbSamples
+from manikin.kinematics.limb_samples import SINGLE, LimbSamples
 from manikin.numerics.spatial import FloatArray
 from manikin.scene.surface_table import SurfaceTable
 from manikin.scene.triangles import IntArray
@@ -115,25 +115,29 @@ def _near_planes(
     With them go the positions of their surfaces in ``numbers``, and the heights over the planes [m].
     """
     leaves, frames = samples.leaves, table.frames[table.group[numbers]]
+    count, size = leaves.rows.shape
     axes = frames @ situation.rotation  # (m, 3, 3): the normal and two sides, in the limb's frame
-    ends = table.extents[numbers] - (frames @ situation.origin)[..., None]
-    ends[:, 0] += [-tolerance, tolerance]
-    middle, half = ends.mean(axis=2), 0.5 * (ends[..., 1] - ends[..., 0])
-    # Leaves in single precision, which their bounds allow for, samples in double.
-    rough = axes.astype(np.float32)
-    at = (rough.reshape(-1, 3) @ leaves.centres).reshape(len(numbers), 3, len(leaves.rows))
-    at -= middle.astype(np.float32)[..., None]
-    within = np.abs(at, out=at) <= half.astype(np.float32)[..., None] + leaves.radii
-    near = rough[:, 0] @ leaves.axes >= np.cos(np.minimum(leaves.spreads + max_tilt, np.pi)) - _ROUNDING
-    near &= within[:, 0] & within[:, 1] & within[:, 2]
-    owner, leaf = np.divmod(near.ravel().nonzero()[0], len(leaves.rows))
-    parts, heads, axis = leaves.positions[leaf], leaves.upward[leaf], axes[owner, 0][..., None]
-    height = parts[:, 0] * axis[:, 0] + parts[:, 1] * axis[:, 1] + parts[:, 2] * axis[:, 2]
-    height -= table.offsets[numbers[owner], None] - (frames[:, 0] @ situation.origin)[owner, None]
-    upright = heads[:, 0] * axis[:, 0] + heads[:, 1] * axis[:, 1] + heads[:, 2] * axis[:, 2]
-    pair, place = ((upright >= np.cos(max_tilt)) & (np.abs(height) <= tolerance)).nonzero()
-    rows, owner, height = leaves.rows[leaf[pair], place], owner[pair], height[pair, place]
-    at = np.einsum("pai,pi->pa", axes[owner, 1:], samples.positions.take(rows, axis=0))
-    beside = (at >= ends[owner, 1:, 0]) & (at <= ends[owner, 1:, 1])
-    inside = (beside[:, 0] & beside[:, 1]).nonzero()[0]
-    return rows[inside], owner[inside], height[inside]
+    low, high = np.moveaxis(table.extents[numbers] - (frames @ situation.origin)[..., None], 2, 0)
+    # Leaves in single precision, which their bounds allow for; the sides only of what is near a plane.
+    rough, middle, half = (item.astype(np.float32) for item in (axes, 0.5 * (low + high), 0.5 * (high - low)))
+    normals, *sides = np.ascontiguousarray(rough.transpose(1, 0, 2))
+    near = np.abs(normals @ leaves.centres - middle[:, :1]) <= leaves.radii + np.float32(tolerance)
+    near &= normals @ leaves.axes >= np.cos(np.minimum(leaves.spreads + max_tilt, np.pi)) - _ROUNDING
+    owner, leaf = np.divmod(near.ravel().nonzero()[0], count)
+    for number, side in enumerate(sides, 1):
+        away = (side @ leaves.centres).ravel().take(owner * count + leaf) - middle[:, number].take(owner)
+        kept = (np.abs(away) <= half[:, number].take(owner) + leaves.radii.take(leaf)).nonzero()[0]
+        owner, leaf = owner.take(kept), leaf.take(kept)
+    away = np.einsum("pi,pik->pk", normals.take(owner, axis=0), leaves.positions.take(leaf, axis=0))
+    away -= middle[:, 0].take(owner)[:, None]
+    pair, place = np.divmod((np.abs(away) <= tolerance + SINGLE).ravel().nonzero()[0], size)
+    rows, owner = leaves.rows.ravel().take(leaf.take(pair) * size + place), owner.take(pair)
+    # Samples in double precision.
+    heads, upward = axes[:, 0].take(owner, axis=0), samples.upward.take(rows, axis=0)
+    kept = (np.einsum("pi,pi->p", heads, upward) >= np.cos(max_tilt)).nonzero()[0]
+    rows, owner = rows.take(kept), owner.take(kept)
+    at = np.einsum("pai,pi->pa", axes.take(owner, axis=0), samples.positions.take(rows, axis=0))
+    height = at[:, 0] - low[:, 0].take(owner)
+    inside = (np.abs(height) <= tolerance) & (at[:, 1:] >= low[:, 1:].take(owner, axis=0)).all(axis=1)
+    found = (inside & (at[:, 1:] <= high[:, 1:].take(owner, axis=0)).all(axis=1)).nonzero()[0]
+    return rows.take(found), owner.take(found), height.take(found)
