@@ -3,11 +3,11 @@ import pytest
 from tests.planning.push_pull.conftest import FEW
 
 from manikin.body import Configuration
-from manikin.contact import ContactKind
-from manikin.numerics.spatial import GRAVITY
-from manikin.planning.contacts import ClosestDistance
+from manikin.contact import ContactKind, grasp
+from manikin.numerics.spatial import GRAVITY, onto_normal
+from manikin.planning.contacts import Candidates, ClosestDistance
 from manikin.planning.push_pull import Act, BraceSettings, find_braced_posture
-from manikin.planning.push_pull.stance_heuristics import Loads
+from manikin.planning.push_pull.stance_heuristics import Loads, Mirrored
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 
@@ -113,3 +113,18 @@ def test_feet_slide_where_the_load_is_beyond_their_friction(body, brace, push):
         margins.append(Loads(body.mass, low[None]).best_place(feet, near, np.array([0.1, 0.1]))[1])
     assert margins[0] > 0.0
     assert margins[1] == -np.inf
+
+
+def test_both_hands_hold_the_same_face_of_a_bar():
+    """One on the near face and one behind the bar, 5 cm further, would put a forearm through it."""
+    other = grasp(
+        "left_hand", (1.40, 0.2, 0.95), max_force=400.0, rotation=onto_normal(np.eye(3), [-1.0, 0.0, 0.0])
+    )
+    points = np.array([[1.40, -0.2, 0.95], [1.45, -0.2, 0.95], [1.40, -0.4, 0.95]])
+    normals = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    none = np.zeros(3)
+    there = Candidates(
+        np.arange(3), np.arange(3), points, normals, np.zeros((3, 3, 3)), none, np.zeros((3, 3, 3))
+    )
+    alike = Mirrored(other, np.zeros(3), np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_array_equal(alike.score(None, there), [1.0, 0.0, 0.0])

@@ -277,7 +277,8 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
                 if landed.q is not None:
                     return changes, held, made, landed
                 failed = failed or (made, landed)
-        made, landed = failed or ([], Posed(None, f"{' and '.join(hands)} cannot be left"))
+        stays = ["the step has no posture, whatever the hands hold", f"{' and '.join(hands)} cannot be left"]
+        made, landed = failed or ([], Posed(None, stays[bool(hands)]))
         return [], hands, made, landed
 
     def _hands_before(

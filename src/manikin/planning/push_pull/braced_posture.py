@@ -307,7 +307,7 @@ class _BraceSearch:
             )  # fmt: skip
             if len(hands) == 2 and answer.score < 0.5 * BALANCED:
                 return q, self._none(_HANDS, "the hands cannot act side by side")
-            alike = Mirrored(contact.position, middle, self._across)
+            alike = Mirrored(contact, middle, self._across)
             order = WeightedSum([(1.0, heuristic), (BALANCED, alike)])
         return q, hands
 

@@ -106,24 +106,28 @@ class Natural:
 
 @dataclass(frozen=True, eq=False)
 class Mirrored:
-    """A hand near where the other one is on the other side: 1 or 0; our choice.
+    """A hand near where the other one is on the other side, on a face like its own: 1 or 0; our choice.
 
     Attributes:
-        place: (3,) of the other hand [m].
+        other: Contact of the other hand.
         middle: (3,) a point of the body's plane of symmetry [m].
         across: (3,) unit normal of that plane.
         within: Largest distance from the mirrored place [m].
+        alike: Least cosine of the angle between the normal and the mirrored one.
     """
 
-    place: FloatArray
+    other: Contact
     middle: FloatArray
     across: FloatArray
     within: float = 0.10
+    alike: float = 0.7
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
         """See :class:`manikin.planning.contacts.Heuristic`."""
-        image = self.place - 2.0 * float((self.place - self.middle) @ self.across) * self.across
-        return (np.linalg.norm(candidates.points - image, axis=1) <= self.within).astype(np.float64)
+        mirror = np.eye(3) - 2.0 * np.outer(self.across, self.across)
+        image = self.middle + mirror @ (self.other.position - self.middle)
+        near = np.linalg.norm(candidates.points - image, axis=1) <= self.within
+        return (near & (candidates.normals @ (mirror @ self.other.normal) >= self.alike)).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
