@@ -121,3 +121,13 @@ def test_a_tunnel_that_is_too_low_is_told_at_once():
     assert found.plan is None
     assert found.failure == "no way over the ground has room for the body on hands and knees"
     assert found.searches == 0
+
+
+@pytest.mark.parametrize(("share", "walks"), [(0.53, False), (0.57, True)])
+def test_who_cannot_fold_so_low_does_not_walk_there(share, walks):
+    """People fold to 0.55 of their stature; below 0.53 a walk is walled off at once."""
+    scene = tunnel(share * 1.75, length=0.6)
+    finder = PostureFinder(BODY, scene)
+    ends = Endpoints(finder, 0.7)
+    start, goal = (ends.find(np.array([far, 0.0]), 0.0, Habit.STANDING).stage for far in (0.0, 2.3))
+    assert (WalkSearch(finder, start, goal).search.walled_off() is None) == walks

@@ -30,7 +30,8 @@ from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.seat import leave_seat
 from manikin.scene import Scene
 
-COLUMN = (0.12, 0.5, 0.9)  # radius, lowest and highest end above the ground of what is free, at 1.75 m [m]
+COLUMN = (0.12, 0.5, 0.96)
+"""Radius, lowest and highest end above the ground of what is free, at 1.75 m [m]: as low as a trunk folds."""
 STRONG_TRIES = 16
 """Ways that are refused because a posture at rest asks for more than the strength; then later stages decide,
 as a motion may need less than its postures at rest, whose knees and trunk are not bent for least torque."""
