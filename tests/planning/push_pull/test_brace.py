@@ -2,8 +2,10 @@ import numpy as np
 import pytest
 from tests.planning.push_pull.conftest import FEW
 
-from manikin.body import Configuration
+from manikin.body import Configuration, human
 from manikin.contact import ContactKind, grasp
+from manikin.kinematics.limb_samples import sample_limbs
+from manikin.kinematics.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.numerics.spatial import GRAVITY, onto_normal
 from manikin.planning.contacts import Candidates, ClosestDistance
 from manikin.planning.push_pull import Act, BraceSettings, find_braced_posture
@@ -80,6 +82,24 @@ def test_who_would_slide_puts_a_foot_to_the_wall(body, samples):
     assert before == {"left_foot", "right_foot"}
     assert holding == acting == before | {"left_hand", "right_hand"}
     assert lifting == acting - {"right_foot"}
+
+
+@pytest.mark.parametrize("stature", [1.60, 1.88])
+def test_the_body_arrives_upright_before_a_bar(stature):
+    """0.97 of its height when it stands leaves knees a little bent; the trunk has room there as it stands."""
+    small = human(stature, 79.0, "male")
+    wall = Obstacle("wall", Box((0.2, 1.2, 1.9)), translation=(1.9, 0.0, 0.95))
+    scene = Scene([wall, Obstacle("bar", Box((0.05, 0.6, 0.06)), translation=(1.425, 0.0, 0.95))], 0.0)
+    limbs = sample_limbs(small, np.random.default_rng(0), 10_000)
+    act, asked = Act("pull", "bar", (-1.0, 0.0, 0.0), 300.0), BraceSettings(enough=1, friction=0.3)
+    brace = find_braced_posture(small, scene, limbs, act, np.zeros(2), settings=asked).brace
+    assert brace is not None
+    arrival = brace.stages[0]
+    assert arrival.q[2] > 0.97 * small.standing_posture()[2]
+    left, right = (arrival.contacts[f"{side}_foot"] for side in ("left", "right"))
+    forwards = left.rotation_contact_to_world[:, 0]
+    place = np.append(0.5 * (left.position + right.position), np.arctan2(forwards[1], forwards[0]))
+    assert TrunkClearance(TrunkPostures.of(small), scene).cheapest(place[None])[0] == 0
 
 
 def test_an_object_out_of_reach_is_explained(body, samples, push):

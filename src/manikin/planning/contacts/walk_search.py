@@ -19,7 +19,7 @@ from manikin.body.limbs import hinge_line, stature_of
 from manikin.body.segments import FEET
 from manikin.contact import Contact, SolePart, sole_part
 from manikin.kinematics.step_reach import StepReach
-from manikin.kinematics.trunk_postures import TrunkClearance, TrunkPostures
+from manikin.kinematics.trunk_postures import CEILINGS, TrunkClearance, TrunkPostures
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
@@ -30,7 +30,7 @@ from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.seat import leave_seat
 from manikin.scene import Scene
 
-COLUMN = (0.12, 0.5, 0.96)
+COLUMN = (0.12, 0.5, 1.75 * CEILINGS[-1])
 """Radius, lowest and highest end above the ground of what is free, at 1.75 m [m]: as low as a trunk folds."""
 STRONG_TRIES = 16
 """Ways that are refused because a posture at rest asks for more than the strength; then later stages decide,

@@ -14,6 +14,7 @@ from manikin.contact import Contact, FrictionModel, grasp
 from manikin.kinematics import Preferences
 from manikin.kinematics.efort import Task
 from manikin.kinematics.limb_samples import LimbSamples
+from manikin.kinematics.trunk_postures import TrunkClearance, TrunkPostures
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts import (
     ContactGenerator,
@@ -64,6 +65,9 @@ LIFTING_TIME = 1.2
 
 BESIDE = 0.2
 """Distance of two feet that stand, of a body of 1.75 m [m]."""
+
+BEHIND = (0.0, 0.1, 0.2, 0.3)
+"""Distances at which one of them is tried behind the other, of that body [m]."""
 
 HIGHEST = 0.6
 """Height of a foot on a wall, relative to that of the root that stands."""
@@ -175,6 +179,8 @@ class _BraceSearch:
         self._reference = body.standing_posture() if reference is None else reference
         asked = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
         self._poser = PostureFinder(body, scene, self._reference, asked)
+        self._upright = TrunkPostures.of(body).upright
+        self._clearance = TrunkClearance(TrunkPostures.of(body), scene)
         self._reasons: dict[int, Counter[str]] = {step: Counter() for step in _STEPS}
         self._tried, self._strongest, self._highest = 0, 0.0, np.inf
         facing = act.facing
@@ -252,22 +258,38 @@ class _BraceSearch:
         if up is None:
             return Stage.of(self._body, feet, q, REACHING_TIME), acting
         ((name, ground),) = ((foot, contact) for foot, contact in feet.items() if foot != up)
-        aside = BESIDE * stature_of(self._body) / 1.75 * (1.0 if up.startswith("left") else -1.0)
-        beside = replace(ground, effector=up, position=frozen_array(
-            ground.position + aside * self._across, "place beside the other foot [m]", (3,)
-        ))  # fmt: skip
-        standing, rest = {name: ground, up: beside}, {name: ground, **hands}
+        standing, upright = self._arrival(name, ground, up)
+        rest = {name: ground, **hands}
         steps = (standing, standing), ({**standing, **hands}, standing), ({**standing, **hands}, rest)
-        postures = list[FloatArray]()
-        for held, carrying in steps:
-            posed = self._poser.pose(held, carrying, postures[-1] if postures else q, q[:7], restarts=True)
+        postures = [upright]
+        for (held, carrying), near in zip(steps, (upright, q, q), strict=True):
+            posed = self._poser.pose(held, carrying, postures[-1], near[:7], restarts=True)
             if posed.q is None:
                 return f"{up} does not come to the wall: {posed.reason}"
             postures.append(posed.q)
         # Arms that hold on leave the centre of mass less room.
         contacts, rooms = (standing, steps[1][0], rest), (COM_ROOM, ROOM, ROOM)
-        changes = zip(contacts, postures, (REACHING_TIME, TOUCHING_TIME, LIFTING_TIME), rooms, strict=True)
+        changes = zip(
+            contacts, postures[1:], (REACHING_TIME, TOUCHING_TIME, LIFTING_TIME), rooms, strict=True
+        )
         return *(Stage.of(self._body, *item) for item in changes), acting
+
+    def _arrival(self, name: str, ground: Contact, up: str) -> tuple[dict[str, Contact], FloatArray]:
+        """Feet on the ground before one goes up, and the (nq,) posture upright above them.
+
+        The one that goes up stands beside the other, or behind it where the body is upright only there.
+        """
+        size = stature_of(self._body) / 1.75
+        aside = BESIDE * size * (1.0 if up.startswith("left") else -1.0) * self._across
+        behind = np.array([ground.position + aside - back * size * self._act.facing for back in BEHIND])
+        middles = 0.5 * (ground.position + behind)
+        forwards = ground.rotation_contact_to_world[:, 0]
+        heading = np.arctan2(forwards[1], forwards[0])
+        places = np.column_stack([middles, np.full(len(middles), heading)])
+        chosen = int(np.argmax(self._clearance.cheapest(places) == 0))
+        place = frozen_array(behind[chosen], "place of the other foot [m]", (3,))
+        standing = {name: ground, up: replace(ground, effector=up, position=place)}
+        return standing, self._upright.at(places[chosen])
 
     def _none(self, step: int, reason: str) -> None:
         """Keep a reason for which a step found nothing."""
