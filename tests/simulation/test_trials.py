@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from manikin.body import Configuration, quadruped
 from manikin.control import ControlSettings, ReturnSettings
+from manikin.control.settings import Impedances
 from manikin.errors import InputError
 from manikin.pipeline.stages.execution_stage import _trials
 from manikin.reports.summary_table import trials_line
@@ -177,3 +178,36 @@ def test_late_torques_are_asked_for_ahead_of_time(body, stand):
         errors.append(result.com_max_error_m)
     assert changes[1] < 0.5 * changes[0]
     assert errors[1] < errors[0]
+
+
+def test_a_free_arm_yields_by_the_inverse_of_its_stiffness(body, stand):
+    """With its centre of mass 1 cm aside a forearm turns about itself until I k angle = m g d cos(angle).
+
+    So k angle / cos(angle) is the same for two gains; 3 %, as the rest of the body gives way a little.
+    """
+    plan = stand(1.5)
+    q, joint = np.array(plan.motion.q[0]), body.joint_index("left_forearm_pronation")
+    q[7 + body.joint_index("left_elbow_flexion")] = 0.5 * np.pi
+    q[7 + joint] = 0.0
+    com = np.tile(Configuration(body, q).com, (len(plan.motion.time), 1))
+    bent = replace(plan.motion, q=np.tile(q, (len(com), 1)), com=com)
+    arm = Configuration(body, q)
+    axis = arm.segment_placement("left_forearm")[0][:, 2]
+    aside = np.cross(axis, (0.0, 0.0, 1.0))
+    aside *= 0.01 / np.linalg.norm(aside)
+    segments = tuple(
+        replace(item, com=item.com + arm.segment_placement(item.name)[0].T @ aside)
+        if item.name == "left_forearm" else item
+        for item in body.segments
+    )  # fmt: skip
+    truth = NOTHING.draw(body, Scene([], 0.0), bent, 0)
+    truth = replace(truth, body=replace(truth.body, nominal_mass=None, segments=segments))
+    gains, turned = Impedances(), []
+    for arms in (gains.arms, gains.posture):
+        asked = ControlSettings(impedances=replace(gains, arms=arms))
+        done = execute(body, Scene([], 0.0), bent, plan.schedule, settings=asked, truth=truth).motion
+        turned.append(done.q[-1, 7 + joint] - q[7 + joint])
+    free, as_all = turned
+    load = gains.arms.stiffness * free / np.cos(free)
+    assert load == pytest.approx(gains.posture.stiffness * as_all / np.cos(as_all), rel=0.03)
+    assert 0.1 < abs(free) < 0.2 < abs(as_all)

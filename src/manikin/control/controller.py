@@ -10,7 +10,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, with_root
-from manikin.body.limbs import hanging_segment
+from manikin.body.limbs import hanging_segment, limb_hinges, moving_segments
+from manikin.body.segments import HANDS
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
 from manikin.control import edge_forces, tasks
 from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
@@ -124,8 +125,10 @@ class Controller:
         self._points = {contact.effector for contact in every if contact.kind is ContactKind.POINT}
         self._toes = {name: _hanging_joints(body, name) for name in self._switch.effectors}
         hanging = {joint for some in self._toes.values() for joint in some}
-        self._others = [joint for joint in range(joints) if joint not in hanging]
         carriers = {name for phase in schedule.sequence if phase.load for name in phase.load.masses}
+        self._arms = _free_arms(body, carriers.union(self._switch.effectors))
+        hanging.update(self._arms)
+        self._others = [joint for joint in range(joints) if joint not in hanging]
         named = dict.fromkeys((*self._switch.effectors, self._root, *sorted(carriers)))
         frames = {name: body.effector_frame(name) for name in named}
         names = (name for geometry in self._geometry.values() for name, _ in geometry.patches)
@@ -231,9 +234,10 @@ class Controller:
             frame, planned = state.frames[root], reference.effectors[root]
             wanted.append(tasks.orientation_task(root, frame, planned, gains.pelvis, weights.pelvis))
         wanted += [self._effector_task(support, state, reference) for support in supports.values()]
-        wanted.append(
-            tasks.posture_task("posture", state, reference, gains.posture, weights.posture, self._others)
-        )
+        parts = ("posture", gains.posture, self._others), ("arms", gains.arms, self._arms)
+        for part, gain, joints in parts:
+            if joints:
+                wanted.append(tasks.posture_task(part, state, reference, gain, weights.posture, joints))
         for name, toes in self._toes.items():  # followed as their foot is
             gain = gains.posture if supports[name].mode is SupportMode.STANCE else gains.swing
             if self.settings.watch_toes and supports[name].mode is SupportMode.STANCE:
@@ -387,6 +391,16 @@ def _lies_flat(support: SupportState) -> bool:
 def _touching_points(contact: Contact) -> tuple[str, SolePart, bytes]:
     """What tells the points of contacts apart: a sole may hang over an edge at one place alone."""
     return contact.effector, contact.part, contact.points.tobytes()
+
+
+def _free_arms(body: BodyModel, busy: set[str]) -> list[int]:
+    """Joints of the arms of which no effector is in ``busy``."""
+    taken = {body.effector(name).segment for name in busy}
+    free = [
+        limb for limb in body.limbs
+        if limb.effector in HANDS and taken.isdisjoint(moving_segments(body, limb))
+    ]  # fmt: skip
+    return [body.joint_index(hinge.name) for limb in free for hinge in limb_hinges(body, limb)]
 
 
 def _hanging_joints(body: BodyModel, effector: str) -> list[int]:

@@ -62,13 +62,19 @@ class Impedance:
 
 @dataclass(frozen=True)
 class Impedances:
-    """Feedback gains of each task; the thesis tuned its own by hand and prints none (6.4.2)."""
+    """Feedback gains of each task; the thesis tuned its own by hand and prints none (6.4.2).
+
+    Attributes:
+        arms: Of the angles of arms that the plan gives nothing to hold or carry. They are light: a forearm
+            whose true centre of mass is 1 cm aside turns about itself by tenths of a radian.
+    """
 
     com: Impedance = Impedance(225.0, 30.0)
     swing: Impedance = Impedance(400.0, 40.0)
     stance: Impedance = Impedance(100.0, 40.0)
     pelvis: Impedance = Impedance(100.0, 20.0)
     posture: Impedance = Impedance(100.0, 20.0)
+    arms: Impedance = Impedance(400.0, 40.0)
     angular_momentum: Impedance = Impedance(0.0, 10.0)
 
 

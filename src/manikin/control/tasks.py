@@ -35,7 +35,7 @@ class ForceWish:
     force: FloatArray
     start: float
     ramp: float
-    weight: float = 1.0
+    weight: float = 10.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "force", frozen_array(self.force, "wished force [N]", (3,)))

@@ -115,8 +115,12 @@ class BracedForces:
     residual: float
 
 
-PALM_RESERVE = 0.75
-"""Share of their friction that pressing palms use for a wanted force, so as not to slide; our choice."""
+RESERVE = 0.7
+"""Share of their friction that palms and soles use for a wanted force, so as not to slide: what is left of a
+cone in its inscribed pyramid of four edges, with which motions are controlled."""
+
+STRONG = 0.9
+"""Share of a joint's strength up to which soles keep that reserve, and a posture may act; our choice."""
 
 
 def largest_force(
@@ -138,11 +142,17 @@ def share_force(
 ) -> BracedForces | None:  # fmt: skip
     """The act's force with the smallest share of any joint's strength, or None where friction forbids it.
 
-    A share above 1 is more than the joints have. Pressing palms use :data:`PALM_RESERVE` of their friction.
-    The arguments are those of :func:`largest_force`.
+    A share above 1 is more than the joints have. Pressing palms use :data:`RESERVE` of their friction, soles
+    as well where that takes no more than :data:`STRONG`. The arguments are those of :func:`largest_force`.
     """
-    programme = _Programme(body, q, contacts, act, PALM_RESERVE * friction, friction_model)
-    return programme.solve((0.0, 1.0), (act.force, act.force), (0.0, None))
+    found = None
+    for reserve in (RESERVE, 1.0):
+        used = [replace(item, friction=reserve * item.friction) for item in contacts]
+        programme = _Programme(body, q, used, act, RESERVE * friction, friction_model)
+        found = programme.solve((0.0, 1.0), (act.force, act.force), (0.0, None))
+        if found is not None and found.torque_share <= STRONG:
+            break
+    return found
 
 
 class _Programme:

@@ -28,7 +28,7 @@ from manikin.planning.contacts import (
     WeightedSum,
 )
 from manikin.planning.contacts.contact_plan import COM_ROOM
-from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
+from manikin.planning.push_pull.act import STRONG, Act, ActKind, BracedForces, largest_force, share_force
 from manikin.planning.push_pull.stance_heuristics import (
     LEVEL,
     BraceFooting,
@@ -97,7 +97,7 @@ class BraceSettings:
     heights: tuple[float, ...] = (0.95, 0.88, 0.98)
     leans: tuple[float, ...] = (0.3, 0.2, 0.1, 0.0)
     margin: float = 10.9
-    torque_share: float = 0.9
+    torque_share: float = STRONG
     enough: int = 8
     palm_room: float = 0.02
     friction: float = 0.7

@@ -45,7 +45,7 @@ class MotionScales:
     joint_velocity: float = 0.1
     velocity_share: float = 0.9
     torque_share: float = 0.01
-    strength_share: float = 0.85
+    strength_share: float = 0.75
     acceleration: float = 24.0
     pelvis_acceleration: float = 4.0
     rest: float = 1.0e-3
