@@ -67,6 +67,16 @@ def test_worlds_are_within_what_is_stated(body, still, shelf, seed):
     np.testing.assert_array_equal(again.joints, truth.joints)
 
 
+def test_who_is_light_is_pushed_by_as_much_speed_as_a_person(body):
+    """50 N for 0.1 s change the speed of 75 kg by 67 mm/s."""
+    assert Uncertainty.of(body) == STATED
+    light = quadruped()
+    assert light.mass < 75.0
+    mine = Uncertainty.of(light)
+    assert mine.push_N * mine.push_s / light.mass == pytest.approx(50.0 * 0.1 / 75.0)
+    assert replace(mine, push_N=50.0) == STATED
+
+
 def test_noise_has_the_stated_deviations(body):
     """Of 2000 draws of each coordinate; the deviation of a deviation is then 1.6 %."""
     noise, rng, q = StateNoise(0.01, 0.002, 0.03), np.random.default_rng(0), body.standing_posture()

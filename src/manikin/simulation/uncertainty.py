@@ -16,6 +16,10 @@ LEVER = 0.3
 """Length by which noise of a velocity [m/s] is that of an angular rate [rad/s]; our choice [m]."""
 
 
+PUSHED_MASS = 75.0
+"""Mass up to which the push by default is in proportion to a creature's [kg]."""
+
+
 @dataclass(frozen=True)
 class StateNoise:
     """Standard deviations of what control is told of the state, anew at every control step.
@@ -103,6 +107,13 @@ class Uncertainty:
             finite_number(getattr(self, item.name), f"uncertainty {item.name}", at_least=0.0)
         for name in ("mass_share", "friction_share"):
             finite_number(getattr(self, name), f"uncertainty {name}", at_most=0.9)
+
+    @classmethod
+    def of(cls, body: BodyModel) -> "Uncertainty":
+        """The defaults; creatures lighter than people are pushed in proportion to their mass."""
+        default = cls()
+        share = min(1.0, body.mass / PUSHED_MASS) if body.stature is None else 1.0
+        return replace(default, push_N=share * default.push_N)
 
     def scaled(self, factor: float) -> "Uncertainty":
         """All of them by a factor, but for how long a push lasts."""

@@ -285,7 +285,7 @@ def _trials(scenario: Scenario, task: TrialTask, report: Report) -> dict[str, An
     """The "trials" block: the motion in other worlds, by a body that is ready to be pushed."""
     section = scenario.file.execution
     given = section.uncertainty.model_dump(exclude_none=True)
-    uncertainty = replace(Uncertainty().scaled(given.pop("factor")), **given)
+    uncertainty = replace(Uncertainty.of(task.body).scaled(given.pop("factor")), **given)
     outcome = run_trials(
         task, section.trials, uncertainty=uncertainty, seed=scenario.seed, workers=cpu_count(),
         progress=lambda share: report.progress("trials", share),

@@ -62,7 +62,9 @@ class UncertaintySection(Section):
     joints_deg: NonNegative | None = optional(
         "largest error of each hinge at the beginning [deg] (default: 1)"
     )
-    push_N: NonNegative | None = optional("force of a push on the trunk at any time [N] (default: 50)")
+    push_N: NonNegative | None = optional(
+        "force of a push on the trunk at any time [N] (default: 50; of a creature below 75 kg in proportion)"
+    )
     push_s: NonNegative | None = optional("how long it lasts [s] (default: 0.1)")
 
 
