@@ -14,9 +14,11 @@ from manikin.pipeline.stages import RunContext
 from manikin.pipeline.stages.contact_stage import HOLDING_ACCELERATION, find_supports
 from manikin.planning.contacts import ContactRules, PostureFinder, limb_holds
 from manikin.planning.contacts.limb_places import RUNG_SPACING
+from manikin.planning.contacts.limb_search import FARTHEST_TURN
 from manikin.planning.whole_body.certificate import RefineRequirements
 from manikin.scenarios.families import FAMILIES, draw_scene
 from manikin.scene import Cylinder, Obstacle, Proximity, Scene
+from manikin.scene.surface import HAND_BREADTH
 from manikin.verification.holding import GRASPED
 
 
@@ -108,3 +110,48 @@ def test_places_of_a_foot_on_a_rung_are_close():
         aside = np.unique(holds.positions[:, 1].round(6))
         assert np.diff(aside).max() <= RUNG_SPACING + 1e-5
         assert np.ptp(aside) > 0.1
+
+
+def test_hands_hold_on_away_from_what_ends_their_room():
+    """Half a hand and 5 cm from the next rung; at 3 cm, the end of the room, it could not turn round."""
+    body = human(1.75, 75.0)
+    limb = limb_named(body, "left_arm")
+    samples = sample_limbs(body, np.random.default_rng(0), count=50)
+    reference = np.array(body.standing_posture())
+    ends = np.array([reference[:7], reference[:7]])
+    stile = Obstacle("stile", Cylinder(0.02, 2.4), translation=(0.4, 0.0, 1.2))
+    rungs = [
+        Obstacle(
+            f"rung_{k}", Cylinder(0.016, 0.4), translation=(0.4, 0.2, height),
+            rotation=[[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+        )
+        for k, height in enumerate((0.75, 1.0, 1.25))
+    ]  # fmt: skip
+    scene = Scene([stile, *rungs], None)
+    kinds = {limb.name: ContactKind.GRASP}
+    (holds,) = limb_holds(body, scene, [limb], kinds, ContactRules(), reference, samples, ends, 0.75)
+    on_stile = (np.abs(holds.positions[:, 1]) < 1e-6) & (np.abs(holds.positions[:, 2] - 1.0) < 0.25)
+    heights = np.unique(holds.positions[on_stile, 2].round(4))
+    assert len(heights) >= 4
+    assert heights + heights[::-1] == pytest.approx(2.0, abs=0.02)
+    assert np.abs(heights[:, None] - [0.75, 1.0, 1.25]).min() >= 0.5 * HAND_BREADTH + 0.05
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [9936, 9937])
+def test_hands_that_stay_turn_little_round_what_they_hold(seed):
+    """Between two postures of one flight; they turned by up to 2.7 rad, through the next rung."""
+    context, found = planned(seed)
+    state = Configuration(context.body, found.stages[0].q)
+    turns = []
+    for stage in found.stages:
+        if stage.via is None:
+            continue
+        for name, contact in stage.contacts.items():
+            if contact.kind is ContactKind.GRASP:
+                first, last = (
+                    state.update(q).effector_placement(name)[0].copy() for q in (stage.q, stage.via)
+                )
+                turns.append(np.arccos(np.clip((np.trace(first.T @ last) - 1.0) / 2.0, -1.0, 1.0)))
+    assert turns
+    assert max(turns) <= FARTHEST_TURN

@@ -40,7 +40,7 @@ class _ContactSearch:
         self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
         self._natural = scenario.contacts.ranges == "learnt"
-        self._search: WalkSearch | contacts.LimbSearch | None = None
+        self._search: WalkSearch | contacts.LimbSearch | contacts.CrawlSearch | None = None
 
     def _again(self, phase: int, reason: str) -> ContactSearch:
         """Another plan, without the change of contact of a phase of the last one."""
@@ -109,16 +109,17 @@ class _FootSearch(_ContactSearch):
         found = self._walked(start, walk)
         walk = self._search
         if found.plan is None and isinstance(walk, WalkSearch) and walk.search.walled_off() is not None:
-            self._search, crawl = None, crawl or self._crawl(walk, start, goal)
+            crawl = crawl or self._crawl(walk, start, goal)
             found = replace(crawl, failure=f"{found.failure}; crawling: {crawl.failure}")
         return self._result(found)
 
     def _crawl(self, walk: WalkSearch, start: Stage, goal: Stage) -> Extension:
         """The way on hands and knees below what is too low to walk under."""
-        return contacts.CrawlSearch(
+        self._search = contacts.CrawlSearch(
             self._poser, self._places, start, goal, self._scenario.contacts.friction,
             lambda first, last: self._searched(first, last).run(), walk.settings,
-        ).run()  # fmt: skip
+        )  # fmt: skip
+        return self._search.run()
 
     def _completed(self, plan: ContactPlan) -> tuple[ContactPlan, Scenario | None] | str:
         whole = plan

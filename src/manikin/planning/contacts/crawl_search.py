@@ -3,7 +3,8 @@
 The order of the limbs is that of most four-legged animals that creep: a knee, the hand of its side, the other
 knee, its hand, so that three of them carry at any time.  Each goes to where the way over the ground has it,
 on whatever surface is there.  Getting up is planned from hands and knees to two feet; kneeling down is the
-same backwards, as every posture at rest is at rest backwards as well.
+same backwards, as every posture at rest is at rest backwards as well.  Where a later stage refuses a phase,
+another way to kneel down or to get up, or another gait, is the remedy.
 """
 
 import math
@@ -61,8 +62,12 @@ class _Way(NamedTuple):
         return start + (along - self.along[row]) * ahead, math.atan2(ahead[1], ahead[0])
 
 
+_Choice = tuple[object, ...]
+"""What was chosen for some phases of a plan: a style and a gait, or a side with how the body kneels there."""
+
+
 class CrawlSearch:
-    """Search for the contacts of a way that is crawled in part."""
+    """Search for the contacts of a way that is crawled in part, which can be asked again for another one."""
 
     def __init__(
         self, poser: PostureFinder, endpoints: Endpoints, start: Stage, goal: Stage, friction: float,
@@ -84,12 +89,20 @@ class CrawlSearch:
         self._endpoints, self._settings = endpoints, settings or WalkSettings()
         self._size = stature_of(self._body) / 1.75
         self._surfaces = self._scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
+        self._refused, self._choices = set[_Choice](), list[_Choice | None]()
 
     def run(self) -> Extension:
         """The plan, or why there is none."""
         found = self._planned()
         plan, failure = (None, found) if isinstance(found, str) else (found, None)
         return Extension(plan, self._postures.finder.searches + self._crawling.finder.searches, 0, failure)
+
+    def refuse(self, phase: int) -> bool:
+        """Close what was chosen for a phase of the last plan; False where that is walked."""
+        choice = self._choices[phase] if phase < len(self._choices) else None
+        if choice is not None:
+            self._refused.add(choice)
+        return choice is not None
 
     def _planned(self) -> ContactPlan | str:
         ends = feet_of(self._start.contacts), feet_of(self._goal.contacts)
@@ -110,18 +123,23 @@ class CrawlSearch:
         behind = self._standing(way, last + BEHIND * self._size, self._goal, "behind")
         if isinstance(before, str) or isinstance(behind, str):
             return before if isinstance(before, str) else str(behind)
-        down, up = self._risen(way, before), self._risen(way, behind)
+        down, up = self._risen(way, before, "before"), self._risen(way, behind, "behind")
         if isinstance(down, str) or isinstance(up, str):
             return down if isinstance(down, str) else str(up)
+        refused = "every way to crawl there was refused by a later stage"
         reason, columns = "", {style: (*low[:2], self._size * style.needs) for style in STYLES}
         order = sorted(STYLES, key=lambda x: not column_is_free(self._scene, way.places, columns[x]).all())
         for style, gait in ((each, gait) for each in order for gait in each.gaits):
+            if (style, gait) in self._refused:
+                continue
             crawl = self._on_hands_and_knees(way, down, up, style, gait)
             if not isinstance(crawl, str):
-                crawled = [*_backwards(self._body, down), *crawl[1:], *up.stages[1:]]  # kneeling has crawl[0]
-                return self._joined(before, crawled, behind)
+                parts = _backwards(self._body, down), crawl[1:], up.stages[1:]  # kneeling has crawl[0]
+                choices = down.choice, (style, gait), up.choice
+                self._choices = [each for each, part in zip(choices, parts, strict=True) for _ in part]
+                return self._joined(before, [*chain(*parts)], behind)
             reason = reason or crawl
-        return reason
+        return reason or refused
 
     def _standing(self, way: _Way, along: float, end: Stage, side: str) -> Stage | str:
         """Where the body stands to kneel down, or gets up; the start or goal itself where it is near."""
@@ -145,6 +163,7 @@ class CrawlSearch:
             if walk is None:
                 return "no walk leads to where the body would kneel down"
             stages = [*walk.stages, *stages[1:]]
+            self._choices = [*[None] * len(walk.stages), *self._choices[1:]]
         if behind is not self._goal:
             walk = self._walk(behind, self._goal).plan
             if walk is None:
@@ -154,20 +173,23 @@ class CrawlSearch:
 
     # --- kneeling down and getting up -------------------------------------------------------------
 
-    def _risen(self, way: _Way, standing: Stage) -> "_Rise | str":
-        """Stages from hands and knees to the feet of a stage, or why there are none."""
+    def _risen(self, way: _Way, standing: Stage, side: str) -> "_Rise | str":
+        """Stages from hands and knees to the feet of a stage on one side, or why there are none."""
         feet = {foot: standing.contacts[foot] for foot in FEET}
         middle = np.mean([contact.position for contact in feet.values()], axis=0)
         along = float(way.along[int(np.argmin(np.linalg.norm(way.places - middle, axis=1)))])
         reason = ""
         for (base, behind), lead in product(KNEELING, ("right", "left")):
+            choice = side, base, behind, lead
+            if choice in self._refused:
+                continue
             at = along + behind * self._size
             held = self._contacts(way, (at, at + base * self._size))
             stages = held if isinstance(held, str) else self._got_up(held, feet, lead)
             if not isinstance(stages, str):
-                return _Rise(stages, standing.q, at, base * self._size)
+                return _Rise(stages, standing.q, at, base * self._size, choice)
             reason = reason or stages
-        return f"cannot kneel down at {_text(middle)}: {reason}"
+        return f"cannot kneel down at {_text(middle)}: {reason or 'a later stage refused it'}"
 
     def _got_up(self, held: dict[str, Contact], feet: Contacts, lead: str) -> list[Stage] | str:
         """From four contacts onto two feet, the leading one first."""
@@ -194,6 +216,7 @@ class CrawlSearch:
                 return f"{leaving or landing} cannot {'be put down' if landing else 'leave'}: {posed.reason}"
             if np.abs(posed.q - before)[7:].max() > WIDEST:
                 return f"a joint turns too far as {leaving or landing} {'lands' if landing else 'leaves'}"
+            ways = [before, posed.q]
             if landing is not None:
                 start = Configuration(self._body, before).effector_placement(landing)[1]
                 middle = 0.5 * (start + feet[landing].position) + STEP * feet[landing].normal
@@ -201,6 +224,9 @@ class CrawlSearch:
                 if via is None:
                     return f"{landing} finds no way to {_text(feet[landing].position)}"
                 stages[-1] = Stage.of(self._body, contacts, before, TURNING, via=via)
+                ways.insert(1, via)
+            if crossed := self._postures.finder.crossing(*ways):
+                return f"{crossed} pass through each other as {leaving or landing} moves"
             contacts = after
             stages.append(Stage.of(self._body, contacts, posed.q, self._settings.reach_duration))
         return stages
@@ -259,6 +285,9 @@ class CrawlSearch:
             if via is None:
                 reason = f"{name} finds no way to {_text(contact.position)}"
                 continue
+            if crossed := self._crawling.finder.crossing(q, lifted.q, via, landing.q):
+                reason = f"{crossed} pass through each other as {name} moves"
+                continue
             flight = PACES.flight(contacts[name], contact)
             flying = Stage.of(self._body, staying, lifted.q, flight, ON_FOURS_ROOM, via)
             return along, flying, Stage.of(self._body, landed, landing.q, PACES.shift_duration, ON_FOURS_ROOM)
@@ -299,13 +328,14 @@ class CrawlSearch:
 class _Rise(NamedTuple):
     """Getting up: on hands and knees, then up to two feet, with the posture (nq,) at the end.
 
-    The knees are at ``along`` on the way, the hands ``base`` before them [m].
+    The knees are at ``along`` on the way, the hands ``base`` before them [m]; ``choice`` made it so.
     """
 
     stages: list[Stage]
     q: FloatArray
     along: float
     base: float
+    choice: _Choice
 
 
 def _backwards(body: BodyModel, rise: _Rise) -> list[Stage]:

@@ -163,7 +163,9 @@ class _Grid:
         out = out / np.linalg.norm(out)
         up = axis if axis[2] > 0.0 else -axis
         frame = np.column_stack([up, np.cross(out, up), out]) if steep else turn
-        for share in np.linspace(0.0, 1.0, 1 + int(bar.length / self._spacing)):
+        parts = 2 + int(bar.length / self._spacing)
+        # In the middle of equal parts: at the ends a hand that turns round its bar meets what stops it there.
+        for share in (np.arange(parts) + 0.5) / parts:
             place = (1.0 - share) * bar.start + share * bar.end + (bar.radius + PALM_ROOM) * out
             if self._inside(place[None])[0]:
                 yield _Place(place, frame)

@@ -49,6 +49,8 @@ AHEAD = np.linspace(0.0, 2.0, 7)[1:, None]  # places ahead at which a contact ma
 LOOSE = 1.0  # cost of a limb without a contact, in moves; our choice
 HOOKED = rotations(np.array(0.0), np.array(-0.25 * math.pi), np.array(0.0))
 """Turn of a hand whose fingers hook round an edge, from one that lies flat on it."""
+GRIPPED = 0.5  # weight with which a hand keeps its turn round the bar that it holds; our choice [1/rad^2]
+FARTHEST_TURN = math.radians(60.0)  # by which it turns there from one posture to the next; our choice
 SOLES_APART = 0.02  # least distance of two soles side by side; our choice [m]
 SOLE_ABOVE = 0.1  # distance of two soles of which one may be above the other; our choice [m]
 TURN = 0.2  # distance that counts as much as a right angle when a limb's sample is chosen [m]; our choice
@@ -504,14 +506,14 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             name, held, landed = self.holds[k].effector, self._contacts_of(before), self._contacts_of(after)
             staying = {other: contact for other, contact in held.items() if other != name}
             guesses = self._guesses(self._guide(before), stages[-1].q)
-            lifted = self._posed(held, staying, guesses, (before, k, False))
+            lifted = self._posed(held, staying, guesses, (before, k, False), stages[-1].q)
             if lifted.q is None:
                 self._stuck.add((before, k))
                 return self._refused(before, after, f"{name} cannot leave its contact: {lifted.reason}")
             old, new, q, postures = held.get(name), landed.get(name), lifted.q, [stages[-1].q, lifted.q]
             if new is not None:
                 guesses = self._guesses(self._guide(after), q, (self.holds[k], new))
-                landing = self._posed(landed, staying, guesses, (after, k, True))
+                landing = self._posed(landed, staying, guesses, (after, k, True), q)
                 if landing.q is None:
                     return self._refused(before, after, f"{name} cannot be put down: {landing.reason}")
                 q = landing.q
@@ -584,22 +586,27 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
             out = 0.5 * (before.normal + after.normal) + share * inward
             place = middle + lift * out / max(float(np.linalg.norm(out)), 1e-9)
             wish = {before.effector: Placement(place, None, None, 0.5 / lift**2)}
-            posed = self._posed(staying, staying, self._guesses(start[:7], start), (*move, number), wish)
+            guesses = self._guesses(start[:7], start)
+            posed = self._posed(staying, staying, guesses, (*move, number), lifting, wish)
             if posed.q is not None:
                 return posed.q
         return None
 
     def _posed(
         self, held: Contacts, carrying: Contacts,
-        guesses: Iterable[_Guess], key: tuple[object, ...],
+        guesses: Iterable[_Guess], key: tuple[object, ...], last: FloatArray,
         wishes: Mapping[str, Placement] | None = None,
     ) -> Posed:  # fmt: skip
         """A posture whose points stand upright on their surfaces, as far as they can; looked for once.
 
-        It is near the first of some guesses from which there is one.
+        It is near the first of some guesses from which there is one; hands that hold on turn little round
+        their bars from the posture before, ``last`` (nq,).
         """
         if key not in self._postures:
-            posed = Posed(None)
+            posed, state = Posed(None), self._state.update(last)
+            gripping = [name for name, item in carrying.items() if item.kind is ContactKind.GRASP]
+            turns = {name: Placement(None, state.effector_placement(name)[0], GRIPPED) for name in gripping}
+            wishes = {**turns, **(wishes or {})}
             attempts = (
                 (guide, start, place)
                 for guide, start, near in guesses for place in self._resting_places(carrying, guide, near)
@@ -608,10 +615,21 @@ class LimbSearch(PosedSearch[State, tuple[State, State]]):
                 posed = self.poser.pose(
                     held, carrying, start, guide, place=place, placements=wishes, through=self._on_tips
                 )
-                if posed.q is not None:
+                if posed.q is not None and not (twisted := self._twisted(posed.q, turns)):
                     break
+                posed = posed if posed.q is None else Posed(None, twisted)
             self._postures[key] = self.poser.eased(posed, held, carrying, wishes).at_rest
         return self._postures[key]
+
+    def _twisted(self, q: FloatArray, turns: Mapping[str, Placement]) -> str:
+        """Which hand has turned farther round its bar than a grip can, and that it has; or empty."""
+        state = self._state.update(q)
+        for name, before in turns.items():
+            assert before.rotation is not None
+            turn = np.linalg.norm(pin.log3(before.rotation.T @ state.effector_placement(name)[0]))
+            if turn > FARTHEST_TURN:
+                return f"{name} would turn by {np.degrees(turn):.0f} degrees where it holds on"
+        return ""
 
     def _resting_places(
         self, carrying: Contacts, guide: FloatArray, near: FloatArray | None
