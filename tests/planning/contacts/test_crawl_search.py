@@ -39,12 +39,16 @@ def tunnel(height, length=0.2, side=0.45, yaw=0.0):
     ])  # fmt: skip
 
 
-def searched(scene, away, yaw=0.0):
+def prepared(scene, away, yaw=0.0):
     finder = PostureFinder(BODY, scene)
     ends = Endpoints(finder, 0.7)
     heading = rotation_from_yaw(yaw)[:2, 0]
     start, goal = (ends.find(far * heading, yaw, Habit.STANDING).stage for far in (0.0, away))
-    return CrawlSearch(finder, ends, start, goal, 0.7, lambda a, b: WalkSearch(finder, a, b).run()).run()
+    return CrawlSearch(finder, ends, start, goal, 0.7, lambda a, b: WalkSearch(finder, a, b).run())
+
+
+def searched(scene, away, yaw=0.0):
+    return prepared(scene, away, yaw).run()
 
 
 def test_a_tunnel_is_crawled_through_whatever_its_heading(checked):
@@ -114,6 +118,37 @@ def test_the_ways_to_crawl_that_have_room_are_tried_first(monkeypatch, height, f
     found = searched(tunnel(height), 1.9)
     assert found.failure == "refused"
     assert list(dict.fromkeys(tried)) == [*STYLES[first:], *STYLES[:first]]
+
+
+@pytest.mark.long
+def test_a_crawl_that_a_later_stage_refuses_is_planned_in_another_way():
+    """Another gait for a phase on hands and knees, another way up for one behind; nothing for a walk."""
+    search = prepared(tunnel(0.65), 1.9)
+    first = search.run().plan
+
+    def phases(plan, holds):
+        return [k for k, stage in enumerate(plan.stages) if holds(set(stage.contacts))]
+
+    def stood(plan):
+        """Places of knees and hands that the body is on [m]."""
+        return [
+            stage.contacts[name].position
+            for stage in plan.stages if stage.contacts.keys() == set(CRAWLERS) for name in CRAWLERS
+        ]  # fmt: skip
+
+    crawled = phases(first, lambda held: held < set(CRAWLERS))
+    assert search.refuse(crawled[len(crawled) // 2])
+    second = search.run().plan
+    assert np.shape(stood(second)) != np.shape(stood(first)) or not np.allclose(stood(second), stood(first))
+    rising = phases(second, lambda held: bool(held & {"left_foot", "right_foot"}) and bool(held & HANDS))
+    assert search.refuse(rising[-1])
+    third = search.run().plan
+    changes = [
+        [set(stage.contacts) for stage in plan.stages[-8:]] + [plan.stages[-8].q.round(3).tolist()]
+        for plan in (second, third)
+    ]
+    assert changes[0] != changes[1]
+    assert not search.refuse(len(third.stages))
 
 
 def test_a_tunnel_that_is_too_low_is_told_at_once():

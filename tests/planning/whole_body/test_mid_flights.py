@@ -1,12 +1,18 @@
 """Postures in the middle of flights that a contact plan leaves out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from manikin.body import Configuration
+from manikin.pipeline.stages import RunContext
+from manikin.pipeline.stages.contact_stage import find_supports
+from manikin.pipeline.stages.refinement_stage import from_rest_to_rest
 from manikin.planning.whole_body.fit_scales import RefineScales
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.swing_planner import SHARES, with_mid_flights
+from manikin.scenarios.families import FAMILIES, draw_scene
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 
@@ -86,3 +92,24 @@ def test_a_flight_without_a_posture_stays_as_it_is(walked):
     low = Scene([Obstacle("slab", Box((9.0, 9.0, 0.1)), translation=(0.0, 0.0, 0.3))])
     same = with_mid_flights(case.body, low, case.schedule, path)
     np.testing.assert_array_equal(same.time, path.time)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [5002, 5003])
+def test_the_way_to_a_posture_does_not_lead_through_a_rung(seed):
+    """On a ladder shanks were before a rung in a posture and behind it in the next, 6 cm through."""
+    context = RunContext.of(draw_scene(FAMILIES["ladders"], seed), None)
+    body, scene = context.body, context.scene
+    found = find_supports(context.scenario, body, scene, np.random.default_rng(0))
+    assert found.plan is not None, found.failure
+    resting = from_rest_to_rest(replace(context, plan=found.plan))
+    assert resting is not None
+    schedule = resting.plan.schedule(context.scenario.contact_model)
+    path = KeyPath(*resting.plan.keys(schedule))
+    lifted = with_mid_flights(body, scene, schedule, path, dense=True)
+    assert len(lifted.time) > len(path.time)
+    near = Proximity(body, scene)
+    legs = frozenset(pair for pair in near.pairs if not pair[0].endswith(("/shank", "/thigh")))
+    time = np.arange(schedule.instants[0], schedule.instants[-1], 0.02)
+    before, after = (near.minimum_over(way.at(time), legs).distance for way in (path, lifted))
+    assert after > min(before, 0.0) - 0.01  # instants between those that are watched

@@ -36,6 +36,9 @@ them is not clear; our choice."""
 KEPT = (0.75, 0.25)
 """Shares of the wanted distance that they keep from everything that is not touched, tried in turn."""
 
+WATCHED = 25
+"""Instants of a flight at which the path with and without one of them is measured."""
+
 ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
 
@@ -57,7 +60,8 @@ def with_mid_flights(
             body that does not rest in between may be too weak for them.
 
     Returns:
-        The path with the postures that were found; a flight for which there is none stays as it is.
+        The path with the postures that were found, but for those with which the body would go deeper into
+        itself or an obstacle on the way to them.
     """
     proximity = Proximity(body, scene)
     # Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion.
@@ -72,6 +76,8 @@ def with_mid_flights(
             leaning_pairs(body, padded).union(*(touch_pairs(body, scene, item) for item in contacts))
             for contacts in (standing, (*standing, *ends))
         )
+        during = np.linspace(*schedule.swing_interval(swing), WATCHED)
+        clear = proximity.minimum_over(path.at(during), beside).distance
         for share in (*SHARES, *BETWEEN) if dense else SHARES:
             time = curve.start_time + share * curve.duration
             guess = path.at(np.array([time]))[0]
@@ -81,7 +87,12 @@ def with_mid_flights(
             stance, effector = schedule.stance_at(time), swing.effector
             kept = KEPT if dense else KEPT[:1]
             q = _posture_on(body, proximity, curve.at(time), effector, stance, guess, touched, kept)
-            path = path if q is None else path.through(time, q)
+            if q is None:
+                continue
+            longer = path.through(time, q)
+            then = proximity.minimum_over(longer.at(during), beside).distance
+            if then >= min(clear, 0.0):
+                path, clear = longer, then
     return path
 
 
