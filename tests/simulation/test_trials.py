@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, quadruped
-from manikin.control import ControlSettings, ReturnSettings
+from manikin.control import ControlSettings, ReturnSettings, StateNoise
 from manikin.control.settings import Impedances
 from manikin.errors import InputError
 from manikin.pipeline.stages.execution_stage import _trials
@@ -20,7 +20,7 @@ from manikin.scene import Box, Obstacle, Scene
 from manikin.simulation import execute
 from manikin.simulation.execute import _Run
 from manikin.simulation.trials import TrialTask, run_trials
-from manikin.simulation.uncertainty import StateNoise, Uncertainty
+from manikin.simulation.uncertainty import Uncertainty
 
 STATED = Uncertainty()
 NOTHING = STATED.scaled(0.0)
@@ -113,6 +113,20 @@ def test_torques_act_after_the_delay(body, still, shelf, delay):
     late = round(1e3 * delay)
     commanded = [float(k // 4) for k in range(40)]
     assert acted == [commanded[max(k - late, 0)] for k in range(40)]
+
+
+def test_torques_jump_less_where_control_knows_of_the_noise(body, still, shelf):
+    """Root mean square of their steps in a third of a second of standing, at the stated noise alone."""
+    stated = replace(NOTHING, angle_noise_deg=0.1, position_noise_m=0.001, velocity_noise_m_s=0.005)
+    truth = stated.draw(body, shelf, still.motion, 0)
+    steps = []
+    for noise in (StateNoise(), stated.noise):
+        settings = ControlSettings(noise=noise)
+        found = execute(body, shelf, still.motion, still.schedule, hold=0.25, settings=settings, truth=truth)
+        assert not found.fell
+        share = body.torque_share(np.diff(found.motion.tau[:, -(body.nv - 6) :], axis=0))
+        steps.append(np.sqrt(np.mean(share**2)))
+    assert steps[1] < 0.5 * steps[0]
 
 
 def test_feet_begin_where_the_true_ground_carries_them(body, still):

@@ -1,6 +1,7 @@
 """Control: weighted multi-task inverse dynamics that follows a planned motion."""
 
 from manikin.control.controller import Controller, ControlOutput
+from manikin.control.estimate import StateNoise
 from manikin.control.settings import (
     ControlSettings,
     ReturnSettings,
@@ -14,5 +15,5 @@ from manikin.control.tasks import ForceWish
 
 __all__ = [
     "ControlOutput", "ControlSettings", "Controller", "ForceWish", "ReturnSettings", "ShiftSettings",
-    "SoleRoom", "SupportMode", "SupportSettings", "TaskWeights",
+    "SoleRoom", "StateNoise", "SupportMode", "SupportSettings", "TaskWeights",
 ]  # fmt: skip

@@ -18,6 +18,7 @@ from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact,
 from manikin.control.capture_step import ShiftedPlan
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import ContactGeometry, contact_geometry, segment_key
+from manikin.control.estimate import StateEstimator, StateNoise
 from manikin.control.partings import SelfWatch
 from manikin.control.plan_return import Deviation, PlanClock, deviation_from_plan, returning_acceleration
 from manikin.control.reference import Reference, ReferenceSample
@@ -142,8 +143,10 @@ class Controller:
         stepping = self.settings.stepping
         self.shift = None if stepping is None else ShiftedPlan(schedule, stepping, self.settings.period)
         self._previous = np.zeros(joints)
-        pending = math.ceil(self.settings.lead / self.settings.period)
-        self._decided = deque[FloatArray](maxlen=max(1, pending))
+        noise, period = self.settings.noise, self.settings.period
+        pending = math.ceil(self.settings.lead / period)
+        self._decided = deque([np.zeros(body.nv)], maxlen=max(1, pending))
+        self._estimator = StateEstimator(body, noise, period) if noise != StateNoise() else None
         self._carried: dict[str, float] = {}
 
     def step(
@@ -160,6 +163,8 @@ class Controller:
         clock, waited, rate = self.clock, self.clock.waited, self.clock.rate
         time = clock.at(time) + self.settings.lead
         supports = self._switch.update(time, touching)
+        if self._estimator is not None:
+            q, v = self._estimator.update(q, v, self._decided[0])
         state = self._dynamics.evaluate(*self._foreseen(q, v), self.carried_at(time))
         # Where the plan is at its own time, which passes now, and how far the body is from it.
         reference, deviation = self.reference.sample(time, rate, rate), None
@@ -189,7 +194,7 @@ class Controller:
     def _foreseen(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The state when the torques that are decided on now act, by the accelerations decided on."""
         lead = self.settings.lead
-        if lead == 0.0 or not self._decided:
+        if lead == 0.0:
             return q, v
         before = np.mean(self._decided, axis=0)
         way = lead * v + 0.5 * lead**2 * before

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
+from manikin.control.estimate import StateNoise
 from manikin.numerics.spatial import FloatArray, finite_number
 
 
@@ -249,6 +250,7 @@ class ControlSettings:
         stepping: How the steps of a walk are moved when the body is off its plan; None never moves them.
         lead: Time by which torques are believed to act later than they are asked for [s]: they are those of
             the state that is foreseen for then.
+        noise: Of the state that control is told, which is estimated then; without any it is believed.
         watch_toes: Whether toes that bounce off as a foot lands carry nothing until they are down again, and
             come down fast, by torques that know their inertia in the engine; for motions that land at speed.
         toes_back: Gains with which they come down: the edge behind their hinge jams on the floor. With four
@@ -264,6 +266,7 @@ class ControlSettings:
     returning: ReturnSettings | None = None
     stepping: ShiftSettings | None = None
     lead: float = 0.0
+    noise: StateNoise = field(default_factory=StateNoise)
     watch_toes: bool = False
     toes_back: Impedance = Impedance(2500.0, 100.0)
 

@@ -99,7 +99,8 @@ def run_trials(
 ) -> Trials:  # fmt: skip
     """Execute a plan in worlds drawn from an uncertainty.
 
-    Control knows of it that torques act later than they are asked for, by half of the longest delay.
+    Control knows of it that torques act later than they are asked for, by half of the longest delay, and how
+    noisy the state is that it is told.
 
     Args:
         count: Worlds, at least one.
@@ -110,7 +111,8 @@ def run_trials(
     """
     drawn = np.random.default_rng(seed).integers(2**32, size=count).tolist()
     uncertainty = uncertainty or Uncertainty()
-    told = replace(task.bare(), settings=replace(task.settings, lead=0.5 * uncertainty.delay_s))
+    known = replace(task.settings, lead=0.5 * uncertainty.delay_s, noise=uncertainty.noise)
+    told = replace(task.bare(), settings=known)
     items = [_World(told, uncertainty, number) for number in drawn]
     found: dict[int, Trial] = {}
     for number, trial in side_by_side(_tried, items, workers, "trials"):

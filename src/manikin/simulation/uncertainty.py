@@ -6,44 +6,15 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel
+from manikin.control import StateNoise
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.scene import Obstacle, Scene
 from manikin.scene.scene import FLOOR
 from manikin.simulation.push_force import Push, push_on_the_way
 
-LEVER = 0.3
-"""Length by which noise of a velocity [m/s] is that of an angular rate [rad/s]; our choice [m]."""
-
-
 PUSHED_MASS = 75.0
 """Mass up to which the push by default is in proportion to a creature's [kg]."""
-
-
-@dataclass(frozen=True)
-class StateNoise:
-    """Standard deviations of what control is told of the state, anew at every control step.
-
-    Attributes:
-        angle: Of the root's attitude about each axis and of each hinge [rad].
-        position: Of the root along each axis [m].
-        velocity: Of the root along each axis [m/s]; of angular rates over :data:`LEVER`.
-    """
-
-    angle: float
-    position: float
-    velocity: float
-
-    def told(
-        self, body: BodyModel, q: FloatArray, v: FloatArray, rng: np.random.Generator
-    ) -> tuple[FloatArray, FloatArray]:
-        """Configuration (nq,) and velocity (nv,) as control is told them."""
-        near, rate = rng.standard_normal((2, body.nv))
-        near[:3] *= self.position
-        near[3:] *= self.angle
-        rate *= self.velocity
-        rate[3:] /= LEVER
-        return pin.integrate(body.pinocchio, q, near), v + rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +86,12 @@ class Uncertainty:
         share = min(1.0, body.mass / PUSHED_MASS) if body.stature is None else 1.0
         return replace(default, push_N=share * default.push_N)
 
+    @property
+    def noise(self) -> StateNoise:
+        """Noise of the state that control is told."""
+        angle = float(np.deg2rad(self.angle_noise_deg))
+        return StateNoise(angle, self.position_noise_m, self.velocity_noise_m_s)
+
     def scaled(self, factor: float) -> "Uncertainty":
         """All of them by a factor, but for how long a push lasts."""
         larger = {item.name: factor * getattr(self, item.name) for item in fields(self)}
@@ -125,8 +102,6 @@ class Uncertainty:
         rng = np.random.default_rng(seed)
         rub, delay = 1.0 - self.friction_share * rng.uniform(), self.delay_s * rng.uniform()
         joints = np.deg2rad(self.joints_deg) * rng.uniform(-1.0, 1.0, body.nv - 6)
-        angle = np.deg2rad(self.angle_noise_deg)
-        noise = StateNoise(float(angle), self.position_noise_m, self.velocity_noise_m_s)
         latest = max(float(motion.duration) - self.push_s, 0.0)
         way, start = rng.uniform(-180.0, 180.0), float(motion.time[0]) + latest * rng.uniform()
         pushed = self.push_N > 0.0 and self.push_s > 0.0
@@ -136,7 +111,7 @@ class Uncertainty:
             push = replace(push, segment=names[0])
         pushes = (push,) if pushed else ()
         true, raised = self._weighed(body, rng), self._raised(scene, rng)
-        return TrueWorld(true, raised, rub, delay, noise, joints, pushes, seed)
+        return TrueWorld(true, raised, rub, delay, self.noise, joints, pushes, seed)
 
     def _weighed(self, body: BodyModel, rng: np.random.Generator) -> BodyModel:
         """The body with other masses, and its centre of mass elsewhere."""

@@ -1,0 +1,112 @@
+"""State of a body estimated from noisy measurements and the accelerations that control decided on.
+
+Torques of a control that takes noisy measurements for the state jump by a large share of the strength from
+one step to the next.  The filter is a Kalman filter of place and velocity along each coordinate, with the
+constant gains to which it settles; both are measured at every step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body import BodyModel
+from manikin.numerics.spatial import FloatArray, finite_number
+
+LEVER = 0.3
+"""Length by which noise of a velocity [m/s] is that of an angular rate [rad/s]; our choice [m]."""
+
+SURPRISE = (1.0, 5.0)
+"""Standard deviations of the root's acceleration [m/s^2] and of the angular ones [rad/s^2] from what was
+decided on, anew in each step: contacts early or late, other masses, pushes.  See docs/execution.md."""
+
+_SETTLED = 1e-12
+
+
+@dataclass(frozen=True)
+class StateNoise:
+    """Standard deviations of what control is told of the state, anew at every control step.
+
+    Attributes:
+        angle: Of the root's attitude about each axis and of each hinge [rad].
+        position: Of the root along each axis [m].
+        velocity: Of the root along each axis [m/s]; of angular rates over :data:`LEVER`.
+    """
+
+    angle: float = 0.0
+    position: float = 0.0
+    velocity: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("angle", "position", "velocity"):
+            finite_number(getattr(self, name), f"state noise {name!r}", at_least=0.0)
+
+    def told(
+        self, body: BodyModel, q: FloatArray, v: FloatArray, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Configuration (nq,) and velocity (nv,) as control is told them."""
+        near, rate = rng.standard_normal((2, body.nv))
+        near[:3] *= self.position
+        near[3:] *= self.angle
+        rate *= self.velocity
+        rate[3:] /= LEVER
+        return pin.integrate(body.pinocchio, q, near), v + rate
+
+    def gains(self, period: float) -> tuple[FloatArray, FloatArray]:
+        """(2, 2) gains of the root's place and velocity, and of angles and rates, by their innovations."""
+        place = settled_gain(self.position, self.velocity, SURPRISE[0], period)
+        return place, settled_gain(self.angle, self.velocity / LEVER, SURPRISE[1], period)
+
+
+def settled_gain(place: float, velocity: float, acceleration: float, period: float) -> FloatArray:
+    """(2, 2) gain to which the Kalman filter of a measured place and velocity settles.
+
+    Args:
+        place: Standard deviation of the measured place; without any the place is believed.
+        velocity: The same of the velocity.
+        acceleration: Standard deviation of the acceleration from the known one, anew in each period [s].
+    """
+    if not place or not velocity:  # what is exact is believed
+        return np.diag([float(not place), float(not velocity)])
+    passing = np.array([[1.0, period], [0.0, 1.0]])
+    pushed = acceleration * np.array([0.5 * period**2, period])
+    measured = np.diag([place**2, velocity**2])
+    spread: FloatArray = measured
+    gain: FloatArray = np.eye(2)
+    while True:
+        spread = passing @ spread @ passing.T + np.outer(pushed, pushed)
+        last, gain = gain, np.asarray(np.linalg.solve(spread + measured, spread).T, dtype=np.float64)
+        if np.abs(gain - last).max() <= _SETTLED:
+            return gain
+        spread = (np.eye(2) - gain) @ spread
+
+
+class StateEstimator:
+    """Estimates configuration and velocity step by step."""
+
+    def __init__(self, body: BodyModel, noise: StateNoise, period: float) -> None:
+        """Prepare for measurements with some noise at every period [s]."""
+        self._model = body.pinocchio
+        self._period = period
+        place, angle = noise.gains(period)
+        self._gain = np.repeat(np.stack([place, angle]), (3, body.nv - 3), axis=0)
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def update(self, q: FloatArray, v: FloatArray, acceleration: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Configuration (nq,) and velocity (nv,) believed now; the first ones as they are measured.
+
+        Args:
+            q: (nq,) measured configuration.
+            v: (nv,) measured velocity.
+            acceleration: (nv,) generalised acceleration believed to have acted since the last step.
+        """
+        if self._last is not None:
+            before, rate = self._last
+            passed = self._period
+            way = passed * rate + 0.5 * passed**2 * acceleration
+            there, then = pin.integrate(self._model, before, way), rate + passed * acceleration
+            innovation = np.stack([pin.difference(self._model, there, q), v - then], axis=1)
+            by_place, by_rate = np.einsum("nij,nj->in", self._gain, innovation)
+            q, v = pin.integrate(self._model, there, by_place), then + by_rate
+        self._last = q, v
+        return q, v
