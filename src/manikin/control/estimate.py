@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from scipy.linalg import solve_discrete_are
 
 from manikin.body import BodyModel
 from manikin.numerics.spatial import FloatArray, finite_number
@@ -20,7 +21,9 @@ SURPRISE = (1.0, 5.0)
 """Standard deviations of the root's acceleration [m/s^2] and of the angular ones [rad/s^2] from what was
 decided on, anew in each step: contacts early or late, other masses, pushes.  See docs/execution.md."""
 
-_SETTLED = 1e-12
+EXACT = 1e-3
+"""Least noise that is thought of a measurement beside a noisy one, relative to what the surprise of one
+period makes of the same."""
 
 
 @dataclass(frozen=True)
@@ -62,23 +65,17 @@ def settled_gain(place: float, velocity: float, acceleration: float, period: flo
     """(2, 2) gain to which the Kalman filter of a measured place and velocity settles.
 
     Args:
-        place: Standard deviation of the measured place; without any the place is believed.
-        velocity: The same of the velocity.
+        place: Standard deviation of the measured place.
+        velocity: The same of the velocity; without any noise at all both are believed.
         acceleration: Standard deviation of the acceleration from the known one, anew in each period [s].
     """
-    if not place or not velocity:  # what is exact is believed
-        return np.diag([float(not place), float(not velocity)])
+    if place == velocity == 0.0:
+        return np.eye(2)
     passing = np.array([[1.0, period], [0.0, 1.0]])
     pushed = acceleration * np.array([0.5 * period**2, period])
-    measured = np.diag([place**2, velocity**2])
-    spread: FloatArray = measured
-    gain: FloatArray = np.eye(2)
-    while True:
-        spread = passing @ spread @ passing.T + np.outer(pushed, pushed)
-        last, gain = gain, np.asarray(np.linalg.solve(spread + measured, spread).T, dtype=np.float64)
-        if np.abs(gain - last).max() <= _SETTLED:
-            return gain
-        spread = (np.eye(2) - gain) @ spread
+    measured = np.diag(np.maximum([place, velocity], EXACT * pushed) ** 2)
+    spread = solve_discrete_are(passing.T, np.eye(2), np.outer(pushed, pushed), measured)
+    return np.asarray(np.linalg.solve(spread + measured, spread).T, dtype=np.float64)
 
 
 class StateEstimator:
