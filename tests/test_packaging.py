@@ -51,9 +51,7 @@ def declared(*extras):
     return {re.match(r"[\w-]+", line)[0].lower() for line in lines}
 
 
-@pytest.mark.parametrize(
-    ("folder", "extras"), [("src", ("mocap",)), ("tests", ("test", "mocap", "video", "usd"))]
-)
+@pytest.mark.parametrize(("folder", "extras"), [("src", ()), ("tests", ("test", "video", "usd"))])
 def test_every_import_is_declared(folder, extras):
     scripts = {path.stem.replace("_", "-") for path in (ROOT / "docs").glob("*.py")}
     known = {*declared(*extras), *scripts, "manikin", "tests"}

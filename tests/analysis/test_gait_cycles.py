@@ -147,8 +147,6 @@ def test_a_band_is_that_of_the_persons_group_and_holds_its_own_mean(report):
     ],
 )
 def test_what_is_recorded_is_recognised(recordings_folder, file, kind):
-    if file.endswith("c3d"):
-        pytest.importorskip("ezc3d", reason="the extra mocap is not installed")
     if not (path := recordings_folder / file).exists():
         pytest.skip(f"{file} is not there")
     found = reconstruct(read_recording(path))

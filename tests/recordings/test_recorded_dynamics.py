@@ -351,7 +351,6 @@ def analysed(path, frames=None):
     ],
 )
 def test_walks_agree_with_force_plates(script, recordings_folder, file, mass, cop, positive, shift):
-    pytest.importorskip("ezc3d")
     found, supports, schedule, dynamics, measured = analysed(recordings_folder / "grf" / file)
     assert dynamics.body.mass == pytest.approx(mass, abs=0.5)
     margins = recorded_margins(dynamics, schedule, supports.start)

@@ -269,7 +269,6 @@ def test_durations():
     ],
 )
 def test_recorded_supports_are_those_of_the_plates(recordings_folder, file, compared):
-    pytest.importorskip("ezc3d")
     path = recordings_folder / "grf" / f"{file}.c3d"
     if not path.exists():
         pytest.skip(f"{path.name} is not there")

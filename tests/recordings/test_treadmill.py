@@ -9,7 +9,6 @@ from manikin.recordings.supports.treadmill import belt_velocity, from_the_belt, 
 
 @pytest.fixture(scope="module")
 def walk(recordings_folder):
-    pytest.importorskip("ezc3d", reason="the extra mocap is not installed")
     return reconstruct(read_recording(recordings_folder / "grf/btkdata/FunctionalWalk.c3d"))
 
 
@@ -53,7 +52,6 @@ def test_steps_of_a_sprint_are_those_of_its_plates(recordings_folder):
 
     The bar is that of runs: 20 ms, median.
     """
-    pytest.importorskip("ezc3d", reason="the extra mocap is not installed")
     recording = read_recording(recordings_folder / "laboratories/nimble/JA1Gait35.c3d")
     supports = supports_of(reconstruct(recording), start=recording.start)
     assert [one.effector for one in supports.supports] == ["left_foot", "right_foot"] * 2 + ["left_foot"]

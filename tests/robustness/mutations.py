@@ -16,11 +16,16 @@ JUNK = (
 )  # fmt: skip
 
 
-def mutated(whole: bytes, rng: np.random.Generator, *, text: bool) -> bytes:
-    """The content with one to four damages."""
+FACTORS = (-1.0, 0.0, 0.001, 0.01, 0.5, 0.9, 1.1, 2.0, 100.0, 1000.0)
+
+
+def mutated(whole: bytes, rng: np.random.Generator, *, text: bool, gentle: bool = False) -> bytes:
+    """The content with one to four damages; gentle ones leave most files such that they can be read."""
     content = bytearray(whole)
     for _ in range(int(rng.integers(1, 5))):
         kinds = (_bits, _byte, _cut, _double, _zeros, *((_number, _number, _junk, _line) if text else ()))
+        if gentle:
+            kinds = (_scaled, _scaled, _exchanged) if text else (_scaled_word, _scaled_word, _bits)
         content = bytearray(kinds[int(rng.integers(len(kinds)))](bytes(content), rng)) or bytearray(b" ")
     return bytes(content)
 
@@ -63,6 +68,41 @@ def _number(content: bytes, rng: np.random.Generator) -> bytes:
         return content
     match = found[int(rng.integers(len(found)))]
     return content[: match.start()] + NUMBERS[int(rng.integers(len(NUMBERS)))] + content[match.end() :]
+
+
+def _scaled(content: bytes, rng: np.random.Generator) -> bytes:
+    """A number, and at times that many lines below it as well, times a factor."""
+    lines = content.split(b"\n")
+    with_numbers = [number for number, line in enumerate(lines) if NUMBER.search(line)]
+    if not with_numbers:
+        return content
+    first = with_numbers[int(rng.integers(len(with_numbers)))]
+    place, factor = float(rng.random()), FACTORS[int(rng.integers(len(FACTORS)))]
+    for number in range(first, min(first + int(rng.choice([1, 1, 5, 40])), len(lines))):
+        if found := list(NUMBER.finditer(lines[number])):
+            match = found[int(place * len(found))]
+            written = b"%g" % (factor * float(match[0]))
+            lines[number] = lines[number][: match.start()] + written + lines[number][match.end() :]
+    return b"\n".join(lines)
+
+
+def _exchanged(content: bytes, rng: np.random.Generator) -> bytes:
+    """Two numbers in each other's place."""
+    found = list(NUMBER.finditer(content))
+    if len(found) < 2:
+        return content
+    first, second = (found[number] for number in sorted(rng.choice(len(found), 2, replace=False)))
+    between = content[first.end() : second.start()]
+    return content[: first.start()] + second[0] + between + first[0] + content[second.end() :]
+
+
+def _scaled_word(content: bytes, rng: np.random.Generator) -> bytes:
+    """A float of four bytes times a factor."""
+    words = np.frombuffer(content[: len(content) // 4 * 4], np.float32).copy()
+    factor, place = FACTORS[int(rng.integers(len(FACTORS)))], int(rng.integers(len(words)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        words[place] *= np.float32(factor)
+    return words.tobytes() + content[len(content) // 4 * 4 :]
 
 
 def _junk(content: bytes, rng: np.random.Generator) -> bytes:

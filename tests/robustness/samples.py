@@ -2,23 +2,31 @@
 
 import importlib.util
 import json
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 import yaml
+from tests.robustness.mutations import mutated
 
-from manikin.body import creature_from_mjcf, creature_from_urdf
+from manikin.analysis import AnalysisOptions, analyze_file
+from manikin.body import BodyModel, creature_from_mjcf, creature_from_urdf, human
+from manikin.motion import Motion
 from manikin.motion.file import MotionFile, read_motions, write_motions
-from manikin.recordings import read_recording
+from manikin.recordings import read_marker_map, read_recording
 from manikin.reports.formats.bvh import to_bvh
+from manikin.reports.formats.recorded import to_c3d, to_trc
 from manikin.scenarios import load_scenario
 from manikin.scenarios.stance_file import judge_stance_file
+from manikin.scenarios.study_file import load_study
 from manikin.scene.mesh import load_mesh
 from manikin.verification.plan_file import load_contact_plan
+from manikin.walking import walk_along, walking_path
 
 TESTS = Path(__file__).parents[1]
 
@@ -32,12 +40,19 @@ class Format:
         write: Makes the whole file in a folder, with what belongs beside it, and returns it.
         read: Reads a file as a command would, and returns numbers that must be plausible.
         text: Whether words and numbers are mutated as such, not bytes alone.
+        gentle: Whether every second damage is one after which the file can mostly be read.
     """
 
     name: str
     write: Callable[[Path], Path]
     read: Callable[[Path], list[Any]]
     text: bool = True
+    gentle: bool = False
+
+    def damaged(self, whole: bytes, seed: int, case: int) -> bytes:
+        """A content with the damages of a case."""
+        rng = np.random.default_rng((seed, zlib.crc32(self.name.encode()), case))
+        return mutated(whole, rng, text=self.text, gentle=self.gentle and case % 2 == 1)
 
 
 def other_module(path: str) -> Any:
@@ -99,7 +114,8 @@ def _read_motion(path: Path) -> list[Any]:
     for motion in content.motions.values():
         if content.body is not None:
             to_bvh(content.body, motion)
-    return [array for motion in content.motions.values() for array in (motion.q, motion.com)]
+    kinematic = ("q", "v", "com", "angular_momentum")
+    return [getattr(motion, key) for motion in content.motions.values() for key in kinematic]
 
 
 def _amc(folder: Path) -> Path:
@@ -179,6 +195,70 @@ def _bvh(folder: Path) -> Path:
     return _written("small.bvh", other_module("recordings/conftest.py").BVH)(folder)
 
 
+STUDY = """scenario: scene.yaml
+stage: all
+bodies:
+  - {percentiles: [5, 95]}
+  - {sex: male, boundary: 0.9, measures: [stature, mass]}
+  - {sex: female, random: 2, seed: 4}
+  - {name: tall, body: {stature_m: 1.95, mass_kg: 100}}
+sweeps:
+  - {key: contacts.friction, range: [0.3, 0.7, 3]}
+seeds: 3
+"""
+
+
+def _study(folder: Path) -> Path:
+    _scenario(folder)
+    return _written("study.yaml", STUDY)(folder)
+
+
+def _read_study(path: Path) -> list[Any]:
+    study = load_study(path)
+    return [value for body in study.bodies for value in body.keys.values() if isinstance(value, float)]
+
+
+def _marker_map(folder: Path) -> Path:
+    return _written("map.yaml", other_module("recordings/test_marker_map.py").MAP)(folder)
+
+
+def _read_marker_map(path: Path) -> list[Any]:
+    return [len(read_marker_map(path).places)]
+
+
+@cache
+def _walked() -> tuple[BodyModel, Motion]:
+    """A walk of 1.5 m of the motion library at 50 Hz."""
+    body = human(1.75, 79.0, "male")
+    return body, walk_along(walking_path((0.0, 0.0, 0.0), (1.5, 0.0, 0.0)), body, rate=50.0).motion
+
+
+def _walk(ending: str) -> Callable[[Path], Path]:
+    def write(folder: Path) -> Path:
+        to = {"trc": to_trc, "bvh": to_bvh, "c3d": to_c3d}[ending]
+        content, file = to(*_walked()), folder / f"walked.{ending}"
+        file.write_bytes(content.encode() if isinstance(content, str) else content)
+        return file
+
+    return write
+
+
+def _analyze(path: Path) -> list[Any]:
+    """Numbers of the report, of one that is not said to be implausible, which ends with status 3."""
+    summary = analyze_file(path, AnalysisOptions(mass=79.0, as_recorded=True)).as_dict()
+    return [] if summary["implausible"] else [list(_numbers(summary))]
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, int | float):
+        yield float(value)
+
+
 FORMATS = (
     Format("scenario", _scenario, _read_scenario),
     Format("stance", _written("stance.yaml", yaml.safe_dump(STANCE)), _read_stance),
@@ -197,6 +277,11 @@ FORMATS = (
     Format("glb", _mesh("glb"), _read_mesh, text=False),
     Format("urdf", _urdf, _read_urdf),
     Format("mjcf", _mjcf, _read_mjcf),
+    Format("study", _study, _read_study),
+    Format("marker map", _marker_map, _read_marker_map),
+    Format("analysis of trc", _walk("trc"), _analyze, gentle=True),
+    Format("analysis of bvh", _walk("bvh"), _analyze, gentle=True),
+    Format("analysis of c3d", _walk("c3d"), _analyze, text=False, gentle=True),
 )  # fmt: skip
 
 DAMAGED = {"asf": "person.asf", "mot": "walk.mot"}

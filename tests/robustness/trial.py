@@ -6,14 +6,12 @@ import signal
 import tempfile
 import traceback
 import warnings
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tests.robustness.mutations import mutated
 from tests.robustness.samples import DAMAGED, FORMATS, Format
 
 from manikin.errors import InputError, ManikinError
@@ -52,8 +50,7 @@ def tried(kind: Format, seed: int, cases: range) -> list[Finding]:
         whole = damaged.read_bytes()
         found = []
         for case in cases:
-            rng = np.random.default_rng((seed, zlib.crc32(kind.name.encode()), case))
-            damaged.write_bytes(mutated(whole, rng, text=kind.text))
+            damaged.write_bytes(kind.damaged(whole, seed, case))
             if (what := _fault(kind, path)) is not None:
                 found.append(Finding(kind.name, seed, case, what))
         return found

@@ -189,7 +189,7 @@ class _Robot:
                 raise BodyError(f"{where} turns on the world; valid: a free joint, or none")
             yield link, None
             return
-        turn = _rotation(model.body_quat[number])
+        turn = _rotation(model.body_quat[number], where)
         parent, place = model.body(int(model.body_parentid[number])).name, np.array(model.body_pos[number])
         _check_place(place, where)
         if not joints:
@@ -209,7 +209,7 @@ class _Robot:
     def _link(self, number: int, name: str, where: str) -> UrdfLink:
         model = self.model
         mass, com = float(model.body_mass[number]), np.array(model.body_ipos[number])
-        turn = _rotation(model.body_iquat[number])
+        turn = _rotation(model.body_iquat[number], f"{where} inertia")
         inertia = turn @ np.diag(model.body_inertia[number]) @ turn.T
         if not 0.0 <= mass <= HEAVIEST:
             raise BodyError(f"{where} mass is {mass:g}; valid: 0 to {HEAVIEST:g} kg")
@@ -246,7 +246,7 @@ class _Robot:
             raise BodyError(
                 f"{where} has a size of {own.size.tolist()}; valid: > 0 and at most {FARTHEST:g} m"
             )
-        turn, place = _rotation(item.quat), np.array(item.pos)
+        turn, place = _rotation(item.quat, where), np.array(item.pos)
         _check_place(place, where)
         return UrdfShape(own.kind, own.size, turn @ own.rotation, place + turn @ own.translation)
 
@@ -316,7 +316,9 @@ def _type_name(geom_type: int) -> str:
     return mujoco.mjtGeom(geom_type).name.removeprefix("mjGEOM_").lower()
 
 
-def _rotation(quaternion: FloatArray) -> FloatArray:
+def _rotation(quaternion: FloatArray, where: str) -> FloatArray:
+    if not np.linalg.norm(quaternion) > 0.0:
+        raise BodyError(f"{where} has axes without directions; valid: a quaternion that is not zero")
     return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 

@@ -46,6 +46,8 @@ LARGEST: Mapping[str, float] = {
     "contact_force": 1e9, "margin": np.inf,
 }  # fmt: skip
 """Largest magnitude of a number of each dataset, in its unit; what is larger is damage."""
+UNMEASURED = ("tau", "contact_force", "margin")
+"""Datasets with NaN for what was not measured, such as the forces of a recorded motion."""
 UNIT_NORM = 1e-3
 """Largest deviation of a quaternion's norm from 1."""
 
@@ -251,14 +253,13 @@ def _check_values(motion: Motion, where: str) -> None:
     """Refuse numbers that no motion has."""
     for key, array in motion.arrays().items():
         limit = LARGEST.get(key)
-        # What was not measured of a recorded motion, such as its forces, is NaN.
         worst = 0.0 if limit is None or not array.size else float(np.nanmax(np.abs(array), initial=0.0))
         if limit is not None and worst > limit:
             problem = f"{where}/{key} has the value {worst:.3g}"
             raise MotionFileError(f"{problem}; valid: at most {limit:g} in magnitude [{DATASETS[key][0]}]")
+        if key not in UNMEASURED and not np.all(np.isfinite(array)):
+            raise MotionFileError(f"{where}/{key} is not finite; valid: finite numbers")
     turns = motion.q[:, 3:7]
-    if not np.all(np.isfinite(motion.time)) or not np.all(np.isfinite(motion.q)):
-        raise MotionFileError(f"{where}/q or time is not finite; valid: finite numbers")
     if np.any(np.abs(np.linalg.norm(turns, axis=1) - 1.0) > UNIT_NORM):
         raise MotionFileError(f"{where}/q has a quaternion of another norm than 1; valid: unit quaternions")
 

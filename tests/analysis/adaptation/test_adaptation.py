@@ -390,7 +390,6 @@ def test_planned_timing_free_double_supports_last_longer(walk):
 @pytest.mark.long
 def test_planned_timing_free_nobody_walks_through_the_floor(recordings_folder):
     """Feet admit a way underground: without bounds of the height this walk found one, 1.2 m below."""
-    pytest.importorskip("ezc3d")
     recording = read_recording(recordings_folder / "grf/btkdata/FunctionalWalk.c3d")
     found = reconstruct(recording)
     supports = supports_of(found, start=recording.start)

@@ -19,8 +19,6 @@ RATE = 20.0
 @pytest.fixture(scope="module", params=["trc", "c3d"])
 def again(request, finished_run, tmp_path_factory):
     """A recording that was a motion, and that motion."""
-    if request.param == "c3d":
-        pytest.importorskip("ezc3d", reason="C3D files need ezc3d (extra 'mocap')")
     folder = tmp_path_factory.mktemp("recorded")
     path = export_motion(finished_run, folder, request.param, rate=RATE)
     return read_recording(path), resample(finished_run.executed, RATE)

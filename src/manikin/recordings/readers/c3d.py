@@ -1,4 +1,4 @@
-"""Markers, force plates and events in C3D files, by the library ezc3d.
+"""Markers, force plates and events in C3D files.
 
 The file declares the unit of length, the rates, and the axis that points up on the screen
 (``POINT:Y_SCREEN``, z where it is missing). Points that are angles, forces, moments or powers, computed by
@@ -6,9 +6,7 @@ other programs, are left out. Events and the first frame are on the clock of the
 may be cut.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -44,52 +42,33 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
 
     Raises:
         InputError: If the file is missing, damaged or cut short, a force plate is of a type that is not
-            known or wrongly described, or ezc3d is not installed.
+            known or wrongly described.
     """
     file = str(path)
-    try:
-        import ezc3d
-    except ModuleNotFoundError as error:
-        if error.name != "ezc3d":
-            raise
-        raise InputError(f"{file}: C3D files need ezc3d; install it with: pip install ezc3d") from None
     try:
         content = Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}; valid: a C3D file") from None
     layout = c3d_layout(content, file)
-    with_plates = plates and _has_plates(layout)
-    try:
-        found = ezc3d.c3d(file)
-    except (OSError, RuntimeError, ValueError, IndexError, KeyError, TypeError, MemoryError) as error:
-        reason = " ".join(str(error).split())[:100]
-        raise InputError(f"{file}: cannot be read ({reason}); valid: a complete C3D file") from None
-    remarks, parameters = list[str](), found["parameters"]
+    with np.errstate(all="ignore"):  # damaged numbers are found below
+        points, channels = c3d_frames(content, layout)
+    remarks = list[str]()
     if layout.without_analog_rate:
-        with np.errstate(all="ignore"):  # damaged numbers are found below
-            points, analogs = c3d_frames(content, layout)
         remarks.append(
             f"ANALOG:RATE is missing: {layout.rate * layout.samples:g} Hz by the samples of a frame"
         )
-    else:
-        points, analogs = found["data"]["points"], found["data"]["analogs"][0]
-    if points.shape[1:] != (layout.points, layout.frames):
-        raise layout.error(f"data of shape {points.shape}", f"{layout.frames} frames, {layout.points} points")
     if ("POINT", "RATE") not in layout.parameters:
         remarks.append(f"POINT:RATE is missing: {layout.rate:g} Hz as in the header")
-    unit = _unit(parameters, points, file, remarks)
-    declared_up = next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "")
+    unit = _unit(layout, points, remarks)
+    declared_up = next(iter(layout.texts("POINT", "Y_SCREEN")), "")
     turn = rotation_to_z_up(up or declared_up or "+z", f"{file}: POINT:Y_SCREEN")
-    rate, (names, kept) = layout.rate, _markers(parameters, layout)
-    positions = unit * _finite(points[:3, kept], file, "a point").transpose(2, 1, 0) @ turn.T
-    positions = without_unseen(positions)
+    rate, (names, kept) = layout.rate, _markers(layout)
+    positions = without_unseen(unit * _finite(points[:, kept], file, "a point") @ turn.T)
     names, positions = _within_reach(names, positions, remarks)
-    forces = ()
-    if with_plates:
-        forces = _plates(parameters, analogs, layout, unit, turn, remarks)
+    forces = _plates(channels, layout, unit, turn, remarks) if plates else ()
     recording = MarkerRecording(
         Path(path).name, names, positions, rate, (layout.first_frame - 1) / rate, forces,
-        _events(parameters, layout), _subject(parameters, unit), tuple(remarks),
+        _events(layout), _subject(layout, unit), tuple(remarks),
     )  # fmt: skip
     return recording if up else turned_upright(recording)
 
@@ -98,15 +77,15 @@ FAR_IN_MILLIMETRES = 20.0
 """Usual coordinate above which a number without a unit is in millimetres: no laboratory is as large [m]."""
 
 
-def _unit(parameters: Mapping[str, Any], points: FloatArray, file: str, remarks: list[str]) -> float:
+def _unit(layout: C3dLayout, points: FloatArray, remarks: list[str]) -> float:
     """Unit of length [m], by the size of the numbers where the file names none."""
-    declared = next(iter(_texts(parameters, "POINT", "UNITS")), "")
+    declared = next(iter(layout.texts("POINT", "UNITS")), "")
     if declared:
-        return metres_per(declared, f"{file}: POINT:UNITS")
-    sizes = np.abs(points[:3][np.isfinite(points[:3]) & (points[:3] != 0.0)])
+        return metres_per(declared, f"{layout.file}: POINT:UNITS")
+    sizes = np.abs(points[np.isfinite(points) & (points != 0.0)])
     unit = "mm" if sizes.size and np.median(sizes) > FAR_IN_MILLIMETRES else "m"
     remarks.append(f"POINT:UNITS is missing: {unit} by the size of the numbers")
-    return metres_per(unit, file)
+    return metres_per(unit, layout.file)
 
 
 def _within_reach(
@@ -132,34 +111,32 @@ def _finite(values: FloatArray, file: str, what: str) -> FloatArray:
     return np.asarray(values, dtype=np.float64)
 
 
-def _texts(parameters: Mapping[str, Any], group: str, name: str) -> list[str]:
-    values = parameters.get(group, {}).get(name, {}).get("value", [])
-    return [str(value).strip() for value in values] if isinstance(values, list) else []
-
-
 # --- points ------------------------------------------------------------------------------------
 
 
-def _markers(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[tuple[str, ...], list[int]]:
+def _markers(layout: C3dLayout) -> tuple[tuple[str, ...], list[int]]:
     """Names and indices of the points that are places."""
-    labels = _texts(parameters, "POINT", "LABELS")
+    labels = layout.texts("POINT", "LABELS")
     for number in range(2, 1 + layout.points // 255 + 1):
-        labels += _texts(parameters, "POINT", f"LABELS{number}")
+        labels += layout.texts("POINT", f"LABELS{number}")
     labels = (labels + [""] * layout.points)[: layout.points]
-    others = {name for group in NO_PLACES for name in _texts(parameters, "POINT", group) if name}
+    others = {name for group in NO_PLACES for name in layout.texts("POINT", group) if name}
     kept = [place for place, label in enumerate(labels) if label not in others]
     if not kept:
         raise layout.error("no point is a place", "at least one marker")
     return unique_names([labels[place] for place in kept]), kept
 
 
-def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
+def _subject(layout: C3dLayout, unit: float) -> Subject:
     """Measures that Plug-in Gait leaves in ``PROCESSING``, in the unit of the points, means of both sides."""
-    given = {key.lower().replace(" ", ""): value for key, value in parameters.get("PROCESSING", {}).items()}
+    given = {
+        name.lower().replace(" ", ""): layout.numbers(group, name)
+        for (group, name), parameter in layout.parameters.items()
+        if group == "PROCESSING" and not parameter.is_text and parameter.count
+    }
 
     def measure(factor: float, *names: str) -> float | None:
-        cells = [np.ravel(given[name].get("value", [])) for name in names if name in given]
-        found = [float(cell[0]) for cell in cells if cell.size and np.issubdtype(cell.dtype, np.number)]
+        found = [float(given[name][0]) for name in names if name in given]
         found = [value for value in found if 0.0 < value < LARGEST]
         return factor * float(np.mean(found)) if found else None
 
@@ -171,21 +148,16 @@ def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
     )  # fmt: skip
 
 
-def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:
+def _events(layout: C3dLayout) -> tuple[Event, ...]:
     """Events, whose instants the file holds as minutes and seconds."""
-    declared = layout.parameters.get(("EVENT", "TIMES"))
-    if declared and declared.kind < 0:
-        raise layout.error("EVENT:TIMES are text", "two finite numbers per event")
-    times = np.asarray(parameters.get("EVENT", {}).get("TIMES", {}).get("value", []), dtype=np.float64)
+    times = layout.numbers("EVENT", "TIMES")
     if not times.size:
         return ()
-    if times.ndim == 1 and times.size % 2 == 0:  # as some programs write them
-        times = times.reshape(-1, 2).T
-    if times.ndim != 2 or len(times) != 2 or not np.all(np.abs(times) <= LARGEST):
+    if times.size % 2 or not np.all(np.abs(times) <= LARGEST):
         raise layout.error("EVENT:TIMES are no minutes and seconds", "two finite numbers per event")
-    instants = 60.0 * times[0] + times[1]
+    instants = times.reshape(-1, 2) @ [60.0, 1.0]
     labels, contexts = (
-        (_texts(parameters, "EVENT", name) + [""] * len(instants))[: len(instants)]
+        (layout.texts("EVENT", name) + [""] * len(instants))[: len(instants)]
         for name in ("LABELS", "CONTEXTS")
     )
     return tuple(map(Event, labels, contexts, instants.tolist()))
@@ -195,7 +167,7 @@ def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ..
 
 
 def _has_plates(layout: C3dLayout) -> bool:
-    """Whether there are force plates; what the library reads of them is complete."""
+    """Whether there are force plates; InputError if they are not described completely."""
     used = layout.integers("FORCE_PLATFORM", "USED")
     count = int(used[0]) if len(used) else 0
     if not count:
@@ -215,17 +187,13 @@ def _has_plates(layout: C3dLayout) -> bool:
     complete = len(size) == 3 and min(size[:2]) >= 6 and size[2] >= count
     if not complete and (4 in types or (len(size) > 2 and layout.count("FORCE_PLATFORM", "CAL_MATRIX"))):
         raise layout.error(f"FORCE_PLATFORM:CAL_MATRIX is of size {size}", f"(6, 6, {count})")
-    if 3 in types and 0 < layout.count("FORCE_PLATFORM", "FPCOPPOLY") < 12 * count:
-        raise layout.error("FORCE_PLATFORM:FPCOPPOLY has too few values", f"12 for each of {count}")
-    if layout.count("FORCE_PLATFORM", "UNITS") == 0 and ("FORCE_PLATFORM", "UNITS") in layout.parameters:
-        raise layout.error("FORCE_PLATFORM:UNITS is empty", "a unit")
     return True
 
 
-def _moment_factor(parameters: Mapping[str, Any], channels: list[int]) -> float:
+def _moment_factor(layout: C3dLayout, channels: list[int]) -> float:
     """Lengths of the file's unit in one of the moments', by the units of a plate's channels (from 0)."""
-    lengths = next(iter(_texts(parameters, "POINT", "UNITS")), "mm").lower()
-    units = _texts(parameters, "ANALOG", "UNITS")
+    lengths = next(iter(layout.texts("POINT", "UNITS")), "mm").lower()
+    units = layout.texts("ANALOG", "UNITS")
     declared = {"".join(filter(str.isalpha, units[k].lower())) for k in channels if k < len(units)}
     moments = declared & {"nm", "nmm"}
     if len(moments) != 1 or lengths not in ("m", "mm"):
@@ -234,29 +202,23 @@ def _moment_factor(parameters: Mapping[str, Any], channels: list[int]) -> float:
 
 
 def _plates(
-    parameters: Mapping[str, Any], channels: FloatArray, layout: C3dLayout, unit: float, turn: FloatArray,
-    remarks: list[str],
+    channels: FloatArray, layout: C3dLayout, unit: float, turn: FloatArray, remarks: list[str]
 ) -> tuple[ForcePlate, ...]:  # fmt: skip
     """Plates by their channels (c, n); those whose channels are not in the file are left out, with a remark.
 
     Moments are as their channels declare where most centres of pressure then lie on the plate, else in the
     file's unit of length.
     """
+    if not _has_plates(layout):
+        return ()
     types = layout.integers("FORCE_PLATFORM", "TYPE")
     count = int(layout.integers("FORCE_PLATFORM", "USED")[0])
     used = layout.integers("FORCE_PLATFORM", "CHANNEL").reshape(-1, layout.size("CHANNEL")[0]) - 1
-    corners, origins = (_reals(parameters, layout, name) for name in ("CORNERS", "ORIGIN"))
-    force_unit = next(iter(_texts(parameters, "FORCE_PLATFORM", "UNITS")), "N")
+    corners, origins = (_finite_reals(layout, name) for name in ("CORNERS", "ORIGIN"))
+    force_unit = next(iter(layout.texts("FORCE_PLATFORM", "UNITS")), "N")
     rate = layout.rate
     if force_unit not in ("N", ""):
         raise layout.error(f"force plates in {force_unit[:20]!r}", "N")
-    wanted = (layout.channels, layout.frames * layout.samples)
-    if channels.shape != wanted:
-        remarks.append(
-            f"the {count} force plates are not read: {channels.shape[0]} channels of {channels.shape[1]} "
-            f"samples where {wanted[0]} of {wanted[1]} are declared"
-        )
-        return ()
     sampled, start, found = rate * layout.samples, (layout.first_frame - 1) / rate, []
     for plate, kind in enumerate(types[:count].tolist()):
         name, mine = f"force plate {plate + 1}", used[plate, : CHANNELS[kind]]
@@ -267,13 +229,13 @@ def _plates(
             continue
         calibration = None
         if kind == 4:
-            table = _reals(parameters, layout, "CAL_MATRIX")
+            table = _finite_reals(layout, "CAL_MATRIX")
             calibration = table.reshape(layout.size("CAL_MATRIX"), order="F")[:6, :6, plate]
         surface = corners[12 * plate : 12 * plate + 12].reshape(4, 3)
         own = _finite(channels[mine], layout.file, name)
         origin = origins[3 * plate : 3 * plate + 3]
         force, moment = plate_load(kind, own, surface, origin, calibration)
-        if kind != 3 and (factor := _moment_factor(parameters, mine.tolist())) != 1.0:
+        if kind != 3 and (factor := _moment_factor(layout, mine.tolist())) != 1.0:
             other = plate_load(kind, *_in_lengths(kind, own, calibration, factor, surface, origin))
             if _pressed_inside(*other, surface) >= 0.5:
                 force, moment = other
@@ -312,13 +274,9 @@ def _pressed_inside(force: FloatArray, moment: FloatArray, corners: FloatArray) 
     return float(np.mean(np.linalg.norm(away, axis=1) <= reach))
 
 
-def _reals(parameters: Mapping[str, Any], layout: C3dLayout, name: str) -> FloatArray:
+def _finite_reals(layout: C3dLayout, name: str) -> FloatArray:
     """(n,) values of a parameter of the force plates, none absurd."""
-    try:
-        values = np.ravel(parameters["FORCE_PLATFORM"][name]["value"], order="F").astype(np.float64)
-    except (KeyError, ValueError):
-        raise layout.error(f"FORCE_PLATFORM:{name} is no number", "numbers") from None
-    return _finite(values, layout.file, f"FORCE_PLATFORM:{name}")
+    return _finite(layout.numbers("FORCE_PLATFORM", name), layout.file, f"FORCE_PLATFORM:{name}")
 
 
 def _normal(corners: FloatArray, name: str) -> FloatArray:

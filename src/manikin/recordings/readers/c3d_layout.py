@@ -1,8 +1,7 @@
-"""Header, parameters and force-plate channels of a C3D file, checked against its size (c3d.org, user guide).
+"""Header, parameters, frames and force-plate channels of a C3D file (c3d.org, user guide).
 
-The C++ library that reads the data trusts the counts in a file, so that a damaged one could make it read
-outside its memory. A file that passes here is safe: every record of the parameters lies in its section,
-counts agree with each other, and the file is as long as they say.
+Nothing is read before it is checked: every record of the parameters lies in its section, counts agree with
+each other, and the file is as long as they say.
 
 In a plate's own axes x points from its second corner to the first one, y from the fourth to the first, and
 z at right angles to both, into the ground of most plates. Its origin is the middle of the surface relative to
@@ -13,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import prod
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,10 +59,6 @@ _INTEL, _DEC, _MIPS = 84, 85, 86
 _SIZES = {-1: 1, 1: 1, 2: 2, 4: 4}
 _TEXT, _INTEGERS, _REAL = -1, (1, 2), 4
 _DIMENSIONS, _ENTRIES = 7, 65535  # of one parameter, the most that the format has room for
-_SINGLE = (
-    ("POINT", "FRAMES"), ("POINT", "DATA_START"), ("ANALOG", "RATE"), ("ANALOG", "GEN_SCALE"),
-    ("FORCE_PLATFORM", "USED"),
-)  # fmt: skip
 _READ = ("POINT", "ANALOG", "FORCE_PLATFORM", "EVENT", "ROTATION")
 
 
@@ -79,6 +75,11 @@ class Parameter:
         """Number of values."""
         return prod(self.dimensions)
 
+    @property
+    def is_text(self) -> bool:
+        """Whether the values are texts."""
+        return self.kind == _TEXT
+
 
 @dataclass(frozen=True)
 class C3dLayout:
@@ -91,7 +92,7 @@ class C3dLayout:
         processor: Kind of processor whose numbers these are: 84 Intel, 85 DEC, 86 MIPS.
         header_rate: Frames per second by the header [Hz].
         begin: First byte of the frames.
-        reals: Whether the frames hold reals, else whole numbers to be scaled.
+        real_frames: Whether the frames hold reals, else whole numbers to be scaled.
         parameters: By group and name, both in upper case.
     """
 
@@ -105,22 +106,16 @@ class C3dLayout:
     parameters: Mapping[tuple[str, str], Parameter]
     header_rate: float
     begin: int
-    reals: bool
+    real_frames: bool
 
     @property
     def rate(self) -> float:
-        """Frames per second [Hz]: ``POINT:RATE``, or the header's where that is missing.
-
-        Where it is 0 the library divides by it.
-        """
+        """Frames per second [Hz]: ``POINT:RATE``, or the header's where that is missing."""
         return self.real("POINT", "RATE") if ("POINT", "RATE") in self.parameters else self.header_rate
 
     @property
     def without_analog_rate(self) -> bool:
-        """Whether the file has channels and ``ANALOG:RATE`` is missing or 0.
-
-        The library then takes the channels for points. The samples of a frame are in the header.
-        """
+        """Whether the file has channels and ``ANALOG:RATE`` is missing or 0; the header has the samples."""
         return bool(self.channels) and self.real("ANALOG", "RATE") == 0.0
 
     def integers(self, group: str, name: str) -> NDArray[np.int64]:
@@ -133,14 +128,34 @@ class C3dLayout:
         kind = "u1" if parameter.kind == 1 else (">u2" if self.processor == _MIPS else "<u2")
         return np.frombuffer(parameter.raw, kind).astype(np.int64)
 
+    def reals(self, group: str, name: str) -> FloatArray:
+        """(n,) values of a real parameter, none where it is missing; InputError for other types."""
+        parameter = self.parameters.get((group, name))
+        if parameter is None:
+            return np.zeros(0)
+        if parameter.kind != _REAL:
+            raise self.error(f"{group}:{name} is no real number", "real numbers")
+        return _reals(parameter.raw, self.processor)
+
+    def numbers(self, group: str, name: str) -> FloatArray:
+        """(n,) values of a parameter of any numeric type; InputError for texts."""
+        whole = (group, name) in self.parameters and self.parameters[group, name].kind in _INTEGERS
+        return self.integers(group, name).astype(np.float64) if whole else self.reals(group, name)
+
     def real(self, group: str, name: str) -> float:
         """First value of a real parameter, 0 where it is missing; InputError for other types."""
+        return float(next(iter(self.reals(group, name)), 0.0))
+
+    def texts(self, group: str, name: str) -> list[str]:
+        """Texts of a parameter, without what pads them; none where it is missing or a number."""
         parameter = self.parameters.get((group, name))
-        if parameter is None or not parameter.count:
-            return 0.0
-        if parameter.kind != _REAL:
-            raise self.error(f"{group}:{name} is no real number", "a real number")
-        return _real(parameter.raw, self.processor)
+        if parameter is None or parameter.kind != _TEXT:
+            return []
+        width = parameter.dimensions[0]
+        return [
+            _text(parameter.raw[place * width : (place + 1) * width])
+            for place in range(prod(parameter.dimensions[1:]))
+        ]
 
     def count(self, group: str, name: str) -> int:
         """Number of values of a parameter, 0 where it is missing."""
@@ -157,9 +172,12 @@ class C3dLayout:
         return InputError(f"{self.file}: {wrong}; valid: {valid}")
 
 
-def _real(raw: bytes, processor: int) -> float:
-    """Real number of four bytes."""
-    return float(_reals(raw[:4], processor)[0])
+def _text(raw: bytes) -> str:
+    """Text in UTF-8, or else in Latin-1, as older programs write."""
+    try:
+        return raw.decode().strip("\0 ")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1").strip("\0 ")
 
 
 def _reals(raw: bytes, processor: int) -> FloatArray:
@@ -171,28 +189,29 @@ def _reals(raw: bytes, processor: int) -> FloatArray:
 
 
 def c3d_frames(content: bytes, layout: C3dLayout) -> tuple[FloatArray, FloatArray]:
-    """(3, m, n) points in the file's unit, NaN where not seen, and (c, n s) channels, scaled.
-
-    For files that the library cannot take apart, see :attr:`C3dLayout.without_analog_rate`.
-    """
-    points, channels, samples = layout.points, layout.channels, layout.samples
-    count = layout.frames * (4 * points + channels * samples)
-    if layout.reals:
-        factor, numbers = 1.0, _reals(content[layout.begin : layout.begin + 4 * count], layout.processor)
+    """Points (n, m, 3) in the file's unit, NaN where not seen, and channels (c, n s), scaled."""
+    points, each = layout.points, 4 * layout.points + layout.channels * layout.samples
+    content = content[layout.begin : layout.begin + (4 if layout.real_frames else 2) * layout.frames * each]
+    unsigned = layout.texts("ANALOG", "FORMAT") == ["UNSIGNED"]
+    if layout.real_frames:
+        factor, numbers = 1.0, _reals(content, layout.processor).reshape(layout.frames, each)
+        samples = numbers[:, 4 * points :]
     else:
-        kind = ">i2" if layout.processor == _MIPS else "<i2"
-        numbers = np.frombuffer(content[layout.begin : layout.begin + 2 * count], kind).astype(np.float64)
-        factor = abs(layout.real("POINT", "SCALE"))
-    numbers = numbers.reshape(layout.frames, -1)
-    places = numbers[:, : 4 * points].reshape(layout.frames, points, 4)
+        whole = np.frombuffer(content, ">i2" if layout.processor == _MIPS else "<i2")
+        factor, numbers = abs(layout.real("POINT", "SCALE")), whole.reshape(layout.frames, each)
+        samples = _signed(numbers[:, 4 * points :], unsigned)
+    places = numbers[:, : 4 * points].astype(np.float64).reshape(layout.frames, points, 4)
     places = np.where(places[..., 3:] < 0.0, np.nan, factor * places[..., :3])
-    raw = numbers[:, 4 * points :].reshape(-1, channels).T
-    scale = layout.parameters["ANALOG", "SCALE"]
-    if scale.kind != _REAL:
-        raise layout.error("ANALOG:SCALE is no real number", "real numbers")
-    factors = layout.real("ANALOG", "GEN_SCALE") * _reals(scale.raw, layout.processor)[:channels, None]
-    offset = layout.integers("ANALOG", "OFFSET")[:channels, None].astype(np.int16)
-    return places.transpose(2, 1, 0), factors * (raw - offset)
+    if not layout.channels:
+        return places, np.zeros((0, layout.frames))
+    scale = layout.real("ANALOG", "GEN_SCALE") * layout.reals("ANALOG", "SCALE")[: layout.channels, None]
+    offset = _signed(layout.integers("ANALOG", "OFFSET")[: layout.channels, None], unsigned)
+    return places, scale * (samples.reshape(-1, layout.channels).T - offset)
+
+
+def _signed(numbers: NDArray[np.integer[Any]], unsigned: bool) -> FloatArray:
+    """Whole numbers of two bytes, from 0 on or on both sides of it."""
+    return numbers.astype(np.uint16 if unsigned else np.int16).astype(np.float64)
 
 
 def c3d_layout(content: bytes, file: str) -> C3dLayout:
@@ -219,7 +238,7 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
     layout = C3dLayout(
         file, points, measured // max(samples, 1), samples, max(first, 1), last - first + 1, processor,
         MappingProxyType(_parameters(content[:end], start + 4, big_endian, file)),
-        _real(content[20:24], processor), begin, negative,
+        float(_reals(content[20:24], processor)[0]), begin, negative,
     )  # fmt: skip
     _check_counts(layout, measured)
     wanted = layout.frames * (4 * points + measured) * (4 if negative else 2)
@@ -252,13 +271,8 @@ def _check_counts(layout: C3dLayout, measured: int) -> None:
     agrees = abs(analog_rate / rate - layout.samples) < 0.5
     if layout.channels and not layout.without_analog_rate and not agrees:
         raise layout.error(f"ANALOG:RATE is {analog_rate:g} Hz", f"{rate * layout.samples:g}")
-    if not layout.reals and not layout.count("POINT", "SCALE"):
+    if not layout.real_frames and not layout.count("POINT", "SCALE"):
         raise layout.error("no POINT:SCALE of whole numbers", "a complete file")
-    for name in ("UNITS", "SCALE"):
-        if ("POINT", name) in layout.parameters and not layout.count("POINT", name):
-            raise layout.error(f"POINT:{name} is empty", "a complete file")
-    for name in (name for name in _SINGLE if name in layout.parameters and not layout.count(*name)):
-        raise layout.error(f"{':'.join(name)} is empty", "a value")
     if np.any(layout.integers("ROTATION", "USED")):
         raise layout.error("holds rotations of segments", "markers")
 
@@ -302,7 +316,6 @@ def _parameter(here: "_Reader") -> Parameter:
     if kind not in _SIZES:
         raise here.error(f"type {kind}")
     dimensions = tuple(here.take(here.unsigned()))
-    # The library visits every entry of the leading dimensions, even where the last one is 0.
     if len(dimensions) > _DIMENSIONS or prod(size for size in dimensions if size) > _ENTRIES:
         raise here.error(f"{len(dimensions)} dimensions, {' x '.join(map(str, dimensions[:7]))}")
     if kind == _TEXT and not dimensions:
