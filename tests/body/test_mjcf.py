@@ -152,7 +152,7 @@ TABLE = '<geom type="box" size="0.4 0.4 0.4"/></body>'
         ('mass="20"', 'mass="1e6"', r"mass is 1e\+06"),
         ('mass="20"', 'mass="-1"', "has mass '-1'; valid: not below 0"),
         ('fullinertia="0.6', 'fullinertia="9', "cannot be compiled"),
-        ('fromto="0 0 0 0 0 -0.35"', 'fromto="inf 0 0 0 0 -0.35"', "shank' inertia has axes without directions"),
+        ('fromto="0 0 0 0 0 -0.35"', 'fromto="inf 0 0 0 0 -0.35"', "has axes without directions"),
         ('pos="0.02 0 -0.4"', 'pos="0.02 0 -400"', "at most 100 m away"),
         ('type="box" size="0.1', 'type="box" size="1000', "valid: > 0 and at most 100 m"),
         ('type="box" size="0.1 0.15 0.25"', 'type="plane" size="1 1 1"', "plane"),

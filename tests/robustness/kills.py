@@ -38,7 +38,7 @@ class Command:
 
     Attributes:
         name: As in reports.
-        words: Arguments, with ``{out}`` for the directory and ``{recording}`` for a recording.
+        words: Arguments, with ``{out}`` for the directory, ``{recording}`` and ``{study}`` for such files.
         latest: Time in which it is ended [s].
         is_resumed: Whether it is given again.
         pieces: Pattern of the files of finished pieces, which stay as they are.
@@ -66,6 +66,10 @@ COMMANDS = (
         ),
         30.0, is_resumed=True, pieces="tasks/*.json",
     ),
+    Command(
+        "study", ("study", "{study}", "--jobs", "2", "--out", "{out}"), 30.0,
+        is_resumed=True, pieces="tasks/*.json",
+    ),
 )  # fmt: skip
 
 
@@ -78,7 +82,9 @@ def killed(seed: int, case: int) -> list[str]:
         out = Path(temporary) / "out"
         recording = Path(temporary) / "standing.bvh"
         recording.write_text(other_module("conftest.py").standing_bvh())
-        given = [word.format(out=out, recording=recording) for word in command.words]
+        study = Path(temporary) / "study.yaml"
+        study.write_text("{scenario: stairs, bodies: [{percentiles: [5, 50, 95]}]}")
+        given = [word.format(out=out, recording=recording, study=study) for word in command.words]
         words = [sys.executable, "-m", "manikin", *given]
         token = f"{os.getpid()}-{seed}-{case}"
         process = subprocess.Popen(

@@ -203,7 +203,7 @@ bodies:
   - {sex: female, random: 2, seed: 4}
   - {name: tall, body: {stature_m: 1.95, mass_kg: 100}}
 sweeps:
-  - {key: contacts.friction, range: [0.3, 0.7, 3]}
+  - {key: supports.friction, range: [0.3, 0.7, 3]}
 seeds: 3
 """
 

@@ -79,10 +79,15 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         if names:
             more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
             lines.append(f"{len(names)} markers {why}: {', '.join(names[:MOST_NAMED])}{more}")
-    if repaired := [one for one in found.repairs if one.kind != "gap"]:
+    what = "joints" if isinstance(recording, Recording) else "markers"
+    if repaired := [one for one in found.repairs if one.kind not in ("gap", "jump")]:
         names = ", ".join(dict.fromkeys(one.marker for one in repaired))
         runs = f"{len(repaired)} run{'s' if len(repaired) > 1 else ''} of frames"
-        lines.append(f"cleaned: markers off their places in {runs} are not used as recorded: {names}")
+        lines.append(f"cleaned: {what} off their places in {runs} are not used as recorded: {names}")
+    if jumps := [one for one in found.repairs if one.kind == "jump"]:
+        names = ", ".join(dict.fromkeys(one.marker for one in jumps))
+        frames = ", ".join(map(str, sorted({one.first for one in jumps})[:MOST_NAMED]))
+        lines.append(f"joints jump after frames {frames}, where forces and margins are too large: {names}")
     dropped = len(recording) - len(found.time)
     if dropped > 0:
         lines.append(f"{dropped} of {len(recording)} frames at the ends show too little of the person")

@@ -241,7 +241,7 @@ def analyze(
         cop=_centre_of_pressure(dynamics, motion, min(supports.surfaces, default=0.0)),
         activity=activity, gait=gait,
         segments=walked_segments(found) if activity.kind in WALKS else None, ergonomics=ergonomics,
-        plates=report, remarks=(), wall=0.0, implausible=implausible(dynamics, supports),
+        plates=report, remarks=(), wall=0.0, implausible=implausible(found, dynamics, supports),
     )  # fmt: skip
     remarks = (*notes, *remarks_on(analysis, recording))
     return replace(analysis, remarks=remarks, wall=clock.perf_counter() - began)

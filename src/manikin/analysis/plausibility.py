@@ -10,13 +10,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about
 from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
+from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.supports.body_supports import RecordedSupports
 from manikin.recordings.supports.support_levels import effector_places
 
 LARGEST_LOAD, FASTEST_BODY, FASTEST_LIMB = 20.0, 15.0, 30.0
 """External force per body weight, speeds of the centre of mass, and of hands and feet [m/s]: nobody's."""
+
+LARGEST_TURNING = 5.0
+"""Moment about the centre of mass per body weight that nobody's motion needs [m]: gymnasts need about 1."""
 
 LONGEST_FALL = 0.5
 """Time without any support that a jump of a person may last [s]."""
@@ -24,14 +28,28 @@ LONGEST_FALL = 0.5
 LIMBS = ("left_foot", "right_foot", "left_hand", "right_hand")
 
 
-def implausible(dynamics: RecordedDynamics, supports: RecordedSupports) -> tuple[str, ...]:
+def implausible(
+    found: Reconstruction, dynamics: RecordedDynamics, supports: RecordedSupports
+) -> tuple[str, ...]:
     """Results beyond people's, a line each with the largest value and its instant.
 
     Args:
-        dynamics: The motion as recorded and smoothed.
+        found: The motion as it was recorded.
+        dynamics: The same, smoothed.
         supports: What was found to carry it, on the recording's clock.
     """
-    return (*_findings(dynamics, supports.start), *_unsupported(supports))
+    return (*_jumps(found), *_findings(dynamics, supports.start), *_unsupported(supports))
+
+
+def _jumps(found: Reconstruction) -> Iterator[str]:
+    """The largest jump of a joint that stays in the motion, if it is faster than limbs are."""
+    jumps = [(one.distance or 0.0, one) for one in found.repairs if one.kind == "jump"]
+    distance, largest = max(jumps, key=lambda jump: jump[0], default=(0.0, None))
+    if largest is not None and distance * found.rate > FASTEST_LIMB:
+        yield (
+            f"{largest.marker} jumps after frame {largest.first}, and what it carries by {distance:.2f} m: "
+            "no person does that; forces and margins near there are not to be believed"
+        )
 
 
 def _unsupported(supports: RecordedSupports) -> Iterator[str]:
@@ -46,8 +64,12 @@ def _unsupported(supports: RecordedSupports) -> Iterator[str]:
 
 def _findings(dynamics: RecordedDynamics, start: float) -> Iterator[str]:
     step = float(dynamics.time[1] - dynamics.time[0])
-    load = np.linalg.norm(dynamics.wrench[:, :3], axis=1) / (GRAVITY * dynamics.body.mass)
+    weight = GRAVITY * dynamics.body.mass
+    load = np.linalg.norm(dynamics.wrench[:, :3], axis=1) / weight
+    turning = np.linalg.norm(wrench_about(dynamics.wrench, dynamics.com)[:, 3:], axis=1) / weight
     yield from _beyond("external force", load, LARGEST_LOAD, "body weights", dynamics.time + start)
+    moment = "moment about the centre of mass"
+    yield from _beyond(moment, turning, LARGEST_TURNING, "body weights times a metre", dynamics.time + start)
     speed = np.linalg.norm(np.gradient(dynamics.com, step, axis=0), axis=1)
     yield from _beyond("speed of the centre of mass", speed, FASTEST_BODY, "m/s", dynamics.time + start)
     for name, places in _limbs(dynamics.body, dynamics.q):

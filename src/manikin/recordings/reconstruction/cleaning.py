@@ -44,13 +44,14 @@ frames, and of each frame those that are off by more than this share of the fart
 
 @dataclass(frozen=True)
 class Repair:
-    """Frames, from ``first`` up to, not with, ``stop``, in which one marker was not used as recorded.
+    """Frames, from ``first`` up to, not with, ``stop``, in which a marker or joint was not in its place.
 
     Attributes:
-        kind: ``"spike"``, ``"displaced"`` for longer than a gap that is filled, ``"frozen"``, ``"swap"`` or
-            ``"gap"``.
-        distance: The largest from its place on the body [m]; None in a gap.
-        outcome: ``"filled"``, ``"left out"`` or ``"exchanged"``.
+        kind: ``"spike"``, ``"displaced"`` for longer than a gap that is filled, ``"frozen"``, ``"swap"``,
+            ``"gap"`` or, of a joint of a skeleton that does not come back at once, ``"jump"``.
+        distance: The largest from its place on the body, or of the joint farthest from one that jumps [m];
+            None in a gap.
+        outcome: ``"filled"``, ``"left out"``, ``"exchanged"`` or ``"as recorded"``.
         other: The marker that it was swapped with, or empty.
     """
 

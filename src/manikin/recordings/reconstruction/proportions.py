@@ -124,7 +124,7 @@ class Reconstruction(Displayed):
         first_frame: Frame of the recording that is the first instant.
         others: Markers that are not followed, for their names say nothing or they are never seen with others.
         neutral: Segments about which the recording says nothing; their joints are as in standing.
-        repairs: Frames in which a marker was not used as recorded.
+        repairs: Frames in which a marker or joint was not where it belongs.
     """
 
     body: BodyModel

@@ -34,6 +34,7 @@ from manikin.recordings.reconstruction.proportions import (
     human_of,
     joint_centres,
 )
+from manikin.recordings.reconstruction.skeleton_cleaning import without_joint_jumps
 
 UPRIGHT = ("lumbar", "thorax", "neck", "left_upper_arm", "right_upper_arm")
 """Segments on ball joints, from the pelvis outward, that are upright or hang unless they are recorded."""
@@ -101,9 +102,10 @@ def reconstruct(
 
     Of a skeleton hips, knees, ankles, shoulders, elbows and wrists are followed; the rotations of pelvis,
     thorax, head, feet and hands count less. Our shoulders are fixed in the thorax: movements of a recorded
-    shoulder girdle remain as residuals. Of markers the markers themselves are followed
-    (:mod:`manikin.recordings.reconstruction.marker_reconstruction`). Unmeasured segments are held as in
-    standing, trunk and head upright and arms hanging.
+    shoulder girdle remain as residuals; frames in which a joint is elsewhere are filled
+    (:mod:`manikin.recordings.reconstruction.skeleton_cleaning`). Of markers the markers themselves are
+    followed (:mod:`manikin.recordings.reconstruction.marker_reconstruction`). Unmeasured segments are held
+    as in standing, trunk and head upright and arms hanging.
 
     Args:
         recording: Motion of a skeleton or of markers, at least two frames.
@@ -119,13 +121,15 @@ def reconstruct(
     _check(recording)
     if isinstance(recording, MarkerRecording):
         return unmeasured_upright(reconstruct_markers(recording, body, sex, mass))
+    recording, repairs = without_joint_jumps(recording)
     centres = joint_centres(recording)
     person = human_of(centres, sex, mass) if body is None else body
     pelvis, thorax = (trunk_turns(recording, centres, name) for name in ("pelvis", "thorax"))
     wanted = origin_targets(centres, CENTRES)
     followed = wanted.and_these(orientation_targets(recording, person, centres, pelvis, thorax))
     q, residual = follow(person, followed, analytic_ik(person, centres, pelvis, thorax), recording.rate)
-    return Reconstruction(person, recording.time, q, wanted, residual[:, : len(wanted.names)])
+    residual = residual[:, : len(wanted.names)]
+    return Reconstruction(person, recording.time, q, wanted, residual, repairs=repairs)
 
 
 def person_of(
