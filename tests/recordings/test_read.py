@@ -1,6 +1,7 @@
 """Recordings are read with the right axes, units and rotations; broken files are refused in one line."""
 
 import csv
+import os
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from manikin.body import Configuration, human, random_configuration
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.recordings import read_amc, read_asf, read_bvh, read_recording
+from manikin.recordings import read_amc, read_asf, read_bvh, read_marker_map, read_recording
 from manikin.reports.formats.bvh import rest_rotations, to_bvh
 
 CMU = 0.0254 / 0.45
@@ -195,6 +196,23 @@ def test_what_is_no_recording_is_refused_in_one_line(amc_file, content, name):
         with pytest.raises(InputError) as error:
             read_bvh(missing)
         assert one_line(error)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names")
+@pytest.mark.parametrize("name", ["x.bvh", "person_2.amc", "x.c3d", "x.trc", "map.yaml"])
+def test_what_is_no_file_is_refused_and_not_waited_for(amc_file, name):
+    """Nobody writes to this pipe: opening it would wait for ever."""
+    file = amc_file.with_name(name)
+    os.mkfifo(file)
+    with pytest.raises(InputError, match="is no regular file; valid: a"):
+        read_marker_map(file) if name.endswith("yaml") else read_recording(file)
+
+
+def test_a_file_larger_than_memory_should_hold_is_refused_before_it_is_read(tmp_path):
+    with (tmp_path / "x.bvh").open("wb") as file:
+        file.truncate(10**12)
+    with pytest.raises(InputError, match=r"x.bvh: has 1000000000000 bytes; valid: at most"):
+        read_recording(tmp_path / "x.bvh")
 
 
 @given(st.integers(0, 10**6), st.binary(max_size=4))

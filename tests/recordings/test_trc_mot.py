@@ -1,6 +1,7 @@
 """Markers in TRC and force plates in MOT files: axes, units, what moments are about, damaged copies."""
 
 import csv
+import os
 
 import numpy as np
 import pytest
@@ -337,3 +338,9 @@ def test_standing_up_from_a_chair_is_carried_by_two_plates(recordings_folder):
     sitting = total[neck < neck.min() + 0.15]
     assert 500.0 < np.median(standing) < 900.0
     assert np.median(sitting) < 0.5 * np.median(standing)
+
+
+def test_a_pipe_beside_a_recording_is_no_force_plate(tmp_path):
+    os.mkfifo(tmp_path / "walk.mot")
+    (tmp_path / "walk.trc").write_text(TRC)
+    assert read_recording(tmp_path / "walk.trc").plates == ()

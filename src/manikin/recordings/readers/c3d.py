@@ -23,7 +23,7 @@ from manikin.recordings.readers.markers import (
     without_unseen,
 )
 from manikin.recordings.readers.skeleton_recording import FARTHEST, Subject
-from manikin.recordings.readers.text_files import LARGEST, metres_per, rotation_to_z_up
+from manikin.recordings.readers.text_files import LARGEST, metres_per, read_content, rotation_to_z_up
 from manikin.recordings.readers.upward import turned_upright
 
 NO_PLACES = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "ENERGIES")
@@ -44,11 +44,7 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
         InputError: If the file is missing, damaged or cut short, a force plate is of a type that is not
             known or wrongly described.
     """
-    file = str(path)
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}; valid: a C3D file") from None
+    file, content = str(path), read_content(path, "C3D")
     layout = c3d_layout(content, file)
     with np.errstate(all="ignore"):  # damaged numbers are found below
         points, channels = c3d_frames(content, layout)

@@ -222,7 +222,7 @@ def _forces_beside(path: Path, remarks: list[str]) -> Path | tuple[ForcePlate, .
     others = sorted(
         one
         for one in path.parent.iterdir()
-        if one.suffix.lower() in (".mot", ".sto", ".csv", ".forces") and _holds_forces(one)
+        if one.suffix.lower() in (".mot", ".sto", ".csv", ".forces") and one.is_file() and _holds_forces(one)
     )
     stem = path.stem.lower()
     mine = [one for one in others if one.stem.lower().startswith(stem)]

@@ -47,13 +47,31 @@ LARGEST = 1e12
 """Largest number that is read: beyond it nothing is measured, and sums and products could overflow."""
 
 
-def read_text(path: str | Path, kind: str) -> str:
-    """Text of a file of a ``kind`` such as ``"BVH"``; InputError if it is missing, unreadable or no text."""
+MOST_BYTES = 400_000_000
+"""Largest file that is read; an hour of sixty markers at 100 Hz is half as large as a C3D file."""
+
+MOST_TEXT = 200_000_000
+"""Largest text that is read [bytes]: its numbers take several times as much memory."""
+
+
+def read_content(path: str | Path, kind: str, most: int = MOST_BYTES) -> bytes:
+    """Content of a regular file of a ``kind``; InputError if it is missing, unreadable or too large."""
     file = Path(path)
     try:
-        text = file.read_bytes().decode("utf-8-sig")
+        if file.exists() and not file.is_file():
+            raise InputError(f"{file}: is no regular file; valid: a {kind} file")
+        if (size := file.stat().st_size) > most:
+            raise InputError(f"{file}: has {size} bytes; valid: at most {most}")
+        return file.read_bytes()
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}; valid: a {kind} file") from None
+
+
+def read_text(path: str | Path, kind: str) -> str:
+    """Text of a file of a ``kind`` such as ``"BVH"``; InputError as of :func:`read_content`, or if none."""
+    file = Path(path)
+    try:
+        text = read_content(file, kind, MOST_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{file}: is no text; valid: a {kind} file") from None
     if not text.strip() or "\0" in text:
