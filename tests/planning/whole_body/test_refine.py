@@ -102,6 +102,31 @@ def test_a_motion_with_rests_is_at_rest_there_in_its_key(knee_bends):
     assert result.motion.time[-1] == pytest.approx(result.schedule.instants[-1])
 
 
+def test_parts_that_another_plan_has_too_are_not_fitted_again(knee_bends):
+    """Three parts; the other plan comes to the second one half a second later, and bends deeper in the third.
+
+    The part taken over is the same motion later; certificates are measured on the motion, and hold.
+    """
+    body, time, q, _ = knee_bends
+    phases, fitted = StanceSequence([Phase(Stance(FEET, 1500.0))] * 5), {}
+
+    def refined(standing, keys, known):
+        instants = np.concatenate([[0.0], time + standing])
+        given = body, Scene(), instants, np.vstack([q[:1], keys]), ContactSchedule(phases, instants)
+        return refine_motion(*given, rests=[1, 3], fitted=known)
+
+    first, again = refined(1.0, q, fitted), refined(1.0, q, fitted)
+    assert again.iterations == 0 < first.iterations
+    np.testing.assert_array_equal(again.spline.control_points, first.spline.control_points)
+    found = refined(1.5, q[[0, 1, 2, 2, 4]], fitted)
+    assert found.failure is None, found.failure
+    assert len(fitted) == 5
+    instants = np.linspace(1.0, 2.6, 50)
+    before, after = first.spline.evaluate(instants), found.spline.evaluate(instants + 0.5)
+    np.testing.assert_allclose(after.q, before.q, atol=1e-12)
+    np.testing.assert_allclose(after.a, before.a, atol=1e-8)
+
+
 @pytest.mark.long
 def test_a_motion_with_rests_ends_with_the_part_that_fails(knee_bends):
     """A post in the pelvis: nothing after the first rest is fitted."""

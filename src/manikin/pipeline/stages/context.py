@@ -7,7 +7,7 @@ where they leave, in :class:`Report` and :class:`RunResult`.
 import re
 import time as clock
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ from manikin.planning.whole_body import (
     WholeBodySettings,
 )
 from manikin.planning.whole_body.posture_style import posture_style_of
+from manikin.planning.whole_body.refine import FittedParts
 from manikin.runtime.parallel import Deadline
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
@@ -138,6 +139,7 @@ class RunContext:
         passing: How the body passes changes of contact without rests; None where it rests at all of them.
         start: Contacts and posture with which a motion before ended; None to find them.
         handling: What the hands do, and what the motion takes over from the one before.
+        fitted: Parts of motions from rest to rest that were fitted for any plan of this job.
     """
 
     given: Scenario
@@ -152,6 +154,7 @@ class RunContext:
     passing: "Passing | None" = None
     start: Stage | None = None
     handling: Handling = FREE_HANDS
+    fitted: FittedParts = field(default_factory=dict)
 
     def timed(self) -> "RunContext":
         """The same with the time limit of its scenario from now on."""

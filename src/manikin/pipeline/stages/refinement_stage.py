@@ -39,7 +39,7 @@ def refine_contacts(
         "deadline": context.settings.deadline,
     }  # fmt: skip
     result = refine_motion(
-        body, scene, path.time, path.q, schedule, padded=padded, rests=rests,
+        body, scene, path.time, path.q, schedule, padded=padded, rests=rests, fitted=context.fitted,
         settings=RefineSettings(scales=RefineScales.of(body), **kept),
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip

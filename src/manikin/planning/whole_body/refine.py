@@ -5,6 +5,7 @@ this "is not fully functional"; the optimisation here is our own, with the terms
 whole-body fit.  A fit that breaks a requirement is repeated with other weights, knots, contacts or timing.
 """
 
+import json
 import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -21,6 +22,7 @@ from manikin.contact import ContactSchedule, StanceSequence
 from manikin.kinematics.efort import Task
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
+from manikin.motion.description import describe_schedule
 from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray, finite_number
@@ -42,6 +44,7 @@ from manikin.planning.whole_body.refine_input import (
     KeyPath,
     around,
     check_input,
+    retime,
     shortening,
     stretched,
     stretched_around,
@@ -179,6 +182,21 @@ class _RefineGoal:
         return self.span == (0, len(self.schedule.sequence))
 
     @property
+    def content(self) -> str:
+        """What the fit of the part follows from, whenever it begins, to 1e-9 s, m and rad."""
+        first, last = self.span
+        instants, keys = self.schedule.instants[first : last + 1], self.path.time
+        begin, end = self.interval
+        inside = (keys > begin + 1e-9) & (keys < end - 1e-9)
+        phases = ContactSchedule(StanceSequence(self.schedule.sequence.phases[first:last]), instants)
+        postures = np.vstack([self.path.at(instants), self.path.q[inside]])
+        return json.dumps([
+            describe_schedule(phases)["phases"], (instants - begin).round(9).tolist(),
+            (keys[inside] - begin).round(9).tolist(), postures.round(9).tolist(),
+            [end is None for end in self.ends], self.job.padded,
+        ])  # fmt: skip
+
+    @property
     def interval(self) -> tuple[float, float]:
         """When the part begins and ends [s]."""
         begin, end = self.schedule.instants[list(self.span)].tolist()
@@ -219,6 +237,10 @@ class _RefineGoal:
         return VariableSamples.of(body, names, time, (path.at(time), still, still), keys)
 
 
+FittedParts = dict[str, FitAttempt[_RefineGoal]]
+"""Parts from rest to rest that were fitted, by what their fits follow from."""
+
+
 class Refinement:
     """One job, with what its attempts share.
 
@@ -250,11 +272,13 @@ class Refinement:
         )  # fmt: skip
 
     def run(
-        self, path: KeyPath, schedule: ContactSchedule, rests: Sequence[int], began: float, progress: Progress
-    ) -> RefineResult:
+        self, path: KeyPath, schedule: ContactSchedule, rests: Sequence[int], fitted: FittedParts,
+        began: float, progress: Progress,
+    ) -> RefineResult:  # fmt: skip
         """Fit, repair and measure; the wall time counts from a reading of the clock [s].
 
         A motion that rests at key instants is fitted part by part, and ends with the first part that fails.
+        Parts that were fitted before are taken over.
         """
         count, known = len(schedule.sequence), path.at(schedule.instants)
         self.variables = tuple(dict.fromkeys(phase.stance.effectors, 1.0) for phase in schedule.sequence)
@@ -267,7 +291,7 @@ class Refinement:
             ends = known[first] if first > 0 else None, known[last] if last < count else None
             self._job = replace(self._job, span=(first, last))
             done = partial(self._done, progress, schedule, (first, last))
-            parts.append(self._fitted(replace(goal, span=(first, last), ends=ends), done))
+            parts.append(self._part(replace(goal, span=(first, last), ends=ends), fitted, done))
             goal = parts[-1].goal
             if parts[-1].broken:
                 break
@@ -279,6 +303,25 @@ class Refinement:
         """Tell the share of the whole that is done with a share of a part."""
         start, *ends = schedule.instants[[0, *span, -1]].tolist()
         progress((ends[0] - start + share * (ends[1] - ends[0])) / (ends[2] - start))
+
+    def _part(self, goal: _RefineGoal, known: FittedParts, progress: Progress) -> FitAttempt[_RefineGoal]:
+        """The best motion of a part: that of the same part in another plan, or a new one."""
+        if goal.is_whole:
+            return self._fitted(goal, progress)
+        content = goal.content
+        if content not in known:
+            known[content] = self._fitted(goal, progress)
+            return known[content]
+        found, (first, last) = known[content], goal.span
+        before = goal.schedule.instants
+        its = found.goal.schedule.instants[found.goal.span[0] : found.goal.span[1] + 1]
+        mine = before[first] + its - its[0]
+        after = np.concatenate([before[:first], mine, mine[-1] + before[last + 1 :] - before[last]])
+        path, schedule = retime(goal.path, goal.schedule, before, after)
+        goal, spline = replace(goal, path=path, schedule=schedule), _retimed(found.result.spline, its, mine)
+        motion, certificate = goal.measure(spline)
+        result = found.result._replace(spline=spline)
+        return replace(found, goal=goal, result=result, motion=motion, certificate=certificate)
 
     def _fitted(self, goal: _RefineGoal, progress: Progress) -> FitAttempt[_RefineGoal]:
         """The best motion of a part that was found."""
@@ -326,7 +369,7 @@ class Refinement:
         near = last.result.spline
         if slower:
             goal = self._slower(last)
-            near = _retimed(near, last.goal.schedule, goal.schedule)
+            near = _retimed(near, last.goal.schedule.instants, goal.schedule.instants)
         return job.attempt(goal, scales, fine, near)
 
     def _hurried(self, best: FitAttempt[_RefineGoal], share: float) -> FitAttempt[_RefineGoal]:
@@ -340,7 +383,7 @@ class Refinement:
                 break
             path, schedule = stretched(goal.path, goal.schedule, factors)
             shorter = replace(goal, path=path, schedule=schedule)
-            near = _retimed(best.result.spline, goal.schedule, shorter.schedule)
+            near = _retimed(best.result.spline, goal.schedule.instants, shorter.schedule.instants)
             trial = self._job.attempt(shorter, best.scales, best.fine, near)
             if trial.broken:
                 times = (trial.certificate[key].time_s or 0.0 for key in trial.broken)
@@ -427,18 +470,15 @@ def _until(schedule: ContactSchedule, last: int) -> ContactSchedule:
     return ContactSchedule(StanceSequence(schedule.sequence.phases[:last]), schedule.instants[: last + 1])
 
 
-def _retimed(
-    spline: ConfigurationSpline, before: ContactSchedule, after: ContactSchedule
-) -> ConfigurationSpline:
-    """A spline, or a part of one, in the time of another schedule."""
-    knots = np.interp(spline.knots, before.instants, after.instants)
-    return ConfigurationSpline(knots, spline.control_points, DEGREE)
+def _retimed(spline: ConfigurationSpline, before: FloatArray, after: FloatArray) -> ConfigurationSpline:
+    """A spline, or a part of one, with instants before at others (k,) [s]."""
+    return ConfigurationSpline(np.interp(spline.knots, before, after), spline.control_points, DEGREE)
 
 
 def refine_motion(
     body: BodyModel, scene: Scene, time: ArrayLike, q: ArrayLike, schedule: ContactSchedule, *,
     settings: RefineSettings | None = None, task: Task | None = None, padded: Sequence[str] = (),
-    rests: Sequence[int] = (), progress: Progress | None = None,
+    rests: Sequence[int] = (), fitted: FittedParts | None = None, progress: Progress | None = None,
 ) -> RefineResult:  # fmt: skip
     """Turn key configurations and their contacts into a smooth motion in balance and without collision.
 
@@ -449,6 +489,8 @@ def refine_motion(
         task: Direction of EFORT; the pelvis' displacement in each phase when omitted (7.9).
         padded: Obstacles that any part of the body may lean on.
         rests: Key instants inside at which the body rests in its key configuration, all contacts held.
+        fitted: Parts from rest to rest that were fitted for other plans of the same body, scene and settings;
+            takes new ones up.
         progress: Called now and then with the share done.
 
     Returns:
@@ -465,5 +507,5 @@ def refine_motion(
     check_input(body, path, schedule)
     settings = settings or RefineSettings(scales=RefineScales.of(body))
     return Refinement(body, scene, settings, task, tuple(padded)).run(
-        path, schedule, rests, began, progress or no_progress
+        path, schedule, rests, {} if fitted is None else fitted, began, progress or no_progress
     )
