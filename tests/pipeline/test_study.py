@@ -7,8 +7,10 @@ import pytest
 from scipy.stats import beta, norm
 
 from manikin.cli import main
+from manikin.ergonomics.working_postures import VERDICTS
 from manikin.errors import InputError, MotionFileError
 from manikin.pipeline import study as studies
+from manikin.pipeline.jobs import measures_of
 from manikin.pipeline.study import StudyDirectory, judged, run_study, study_jobs, wilson_interval
 from manikin.reports.pages import study_page
 from manikin.reports.summary_table import group_table, person_lines
@@ -249,3 +251,16 @@ def test_nobody_answers_at_the_address(study, monkeypatch):
     monkeypatch.setattr("manikin.runtime.parallel.CLUSTER_TIMEOUT", 0.5)
     with pytest.raises(InputError, match=r"cluster tcp://127.0.0.1:9: .*valid: tcp://HOST:PORT"):
         run_study(study, cluster="tcp://127.0.0.1:9")
+
+
+def test_a_whole_run_tells_what_ergonomists_ask_for(runs):
+    """Numbers of the run's summary; EN 1005-4 as levels that grow with what is wrong."""
+    summary = runs.step().summary
+    work, told = summary["ergonomics"], measures_of(summary)
+    assert set(told) == set(studies.MEASURES)
+    for name in ("rula_max", "reba_max", "owas_max", "l5s1_max_compression_N"):
+        assert told[name] == work[name] > 0
+    assert told["lifting_index"] is None  # nothing is lifted
+    for how, verdict in work["working_postures"].items():
+        assert VERDICTS[told[f"working_postures_{how}"]] == verdict
+    assert told["capable_share"] == min(work["capable_min_share"].values())

@@ -80,11 +80,6 @@ def test_a_study_of_one_scenario_alone(study):
             "{scenario: stairs, bodies: [{name: a, body: {stature_m: 1.0e+300, mass_kg: 80}}]}",
             "bodies[0] cannot be made: ",
         ),
-        ("{scenario: stairs, sweeps: [{key: contacts.fraction, values: [1]}]}", "sweeps[0] with 1: "),
-        (
-            "{scenario: stairs, sweeps: [{key: body.mass_kg, range: [60, 5000, 5]}]}",
-            "sweeps[0] with 5000.0: ",
-        ),
         ("{scenario: insect-books, bodies: [{random: 2}]}", "bodies are given for the body insect"),
         ("{scenario: stairs, seeds: 0}", "seeds is 0; valid: a list of seeds, or how many"),
         ("{scenario: stairs, seeds: [1, 1]}", "seeds hold one twice"),

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 from joblib import cpu_count
 
+from manikin.ergonomics.working_postures import VERDICTS
 from manikin.errors import ManikinError, TimeLimitError
 from manikin.pipeline.run_directory import CONTACT_PLAN
 from manikin.pipeline.runner import run
@@ -175,32 +176,41 @@ def _outcome(summary: Mapping[str, Any], stage: StageName) -> dict[str, Any]:
     return {
         **reached, "outcome": next((name for name in OUTCOMES if reached.get(name)), "failed"),
         "checked": summary.get("checked"), "failure": None if done else summary["failure"],
-        "steps": contacts.get("steps"), "measures": _measures(summary),
+        "steps": contacts.get("steps"), "measures": measures_of(summary),
         "duration_s": next((block["duration_s"] for block in blocks if block.get("duration_s")), None),
     }  # fmt: skip
 
 
+_SCORES = ("rula_max", "reba_max", "owas_max", "l5s1_max_compression_N", "lifting_index", "force_risk")
+_POSTURES = ("working_postures_rare", "working_postures_frequent")
 MEASURES = (
     "planned_margin_Nm", "executed_margin_Nm", "peak_torque_share", "rest_torque_share", "clearance_m",
-    "com_room_m", "capable_share",
+    "com_room_m", "capable_share", *_SCORES, *_POSTURES,
 )  # fmt: skip
 """Numbers of a job that an entry tells, None where its stages did not come so far.
 
 Least margin of the planned and of the executed motion, about the centre of mass; largest share of a joint's
 torque limit, and the same at rest on the planned contacts; least counted distance; room of the centre of mass
-in the contact plan; least share of people of that size who have the strength for a joint.
+in the contact plan; least share of people of that size who have the strength for a joint; largest scores,
+compression of L5/S1, lifting index and risk of the summary, and worst level of EN 1005-4 (1 to 3) for rare
+and for frequent work.
 """
 
 
-def _measures(summary: Mapping[str, Any]) -> dict[str, float | None]:
+def measures_of(summary: Mapping[str, Any]) -> dict[str, float | None]:
     """Numbers of a run by the names of :data:`MEASURES`."""
     body, executed, checked = (summary.get(key) or {} for key in ("wholebody", "execution", "checked"))
-    shares = ((summary.get("ergonomics") or {}).get("capable_min_share") or {}).values()
+    work = summary.get("ergonomics") or {}
+    shares = (work.get("capable_min_share") or {}).values()
+    level_of = {verdict: level for level, verdict in VERDICTS.items()}
+    verdicts = work.get("working_postures") or {}
     return {
         "planned_margin_Nm": body.get("min_margin"), "executed_margin_Nm": executed.get("min_margin"),
         "peak_torque_share": body.get("max_torque_share"), "clearance_m": body.get("min_clearance_m"),
         "rest_torque_share": checked.get("torque_share"), "com_room_m": checked.get("room_m"),
         "capable_share": min((share for share in shares if share is not None), default=None),
+        **{name: work.get(name) for name in _SCORES},
+        **{name: level_of.get(verdicts.get(name.rpartition("_")[2], "")) for name in _POSTURES},
     }  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -296,14 +296,9 @@ def load_study(path: Path) -> Study:
         for body in made:
             if body.name in bodies:
                 raise error("bodies", f"makes {body.name!r} again; valid: each body once", number)
-            if body.family == "body" and (wrong := _refused(scenario, body.overrides)):
+            if body.family == "body" and (wrong := _refused(scenario, body)):
                 raise error("bodies", f"cannot be made: {wrong}", number)
             bodies[body.name] = body
-    for number, sweep in enumerate(file.sweeps):
-        values = sweep.all_values()
-        for value in (values[0], values[-1]):
-            if wrong := _refused(scenario, sweep.overrides(value)):
-                raise error("sweeps", f"with {value!r}: {wrong}", number)
     bodies = bodies or {"scenario": StudyBody("scenario", "scenario", {}, drawn=False)}
     settings = tuple(_settings(file))
     count = len(bodies) * len(settings) * len(file.seeds)
@@ -312,10 +307,10 @@ def load_study(path: Path) -> Study:
     return Study(file, scenario, tuple(bodies.values()), settings)
 
 
-def _refused(scenario: Scenario, overrides: Sequence[str]) -> str | None:
-    """What is wrong with a scenario that these values are set in; the jobs would all end by it."""
+def _refused(scenario: Scenario, body: StudyBody) -> str | None:
+    """What is wrong with a body in a scenario; all of its jobs would end by it."""
     try:
-        scenario.with_overrides(overrides).build_body()
+        scenario.with_overrides(body.overrides).build_body()
     except InputError as problem:
         return str(problem)
     return None
