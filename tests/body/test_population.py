@@ -110,3 +110,17 @@ def test_wrong_input_is_said():
         boundary_people(Sex.MALE, 0.9, ("neck",))
     with pytest.raises(BodyError, match="percentile"):
         percentile_person(Sex.MALE, 100.0)
+
+
+@pytest.mark.parametrize("sex", SEXES)
+def test_draws_estimate_shares_better_than_independent_ones(sex):
+    """Share of people up to the mean in stature, mass or sitting height, by 50 draws with 40 seeds.
+
+    Independent draws are off by 7.1 % (root mean square); 5 % is less than all but one in 10^5 such sets.
+    """
+    known, count, seeds = population_statistics(sex), 50, range(40)
+    below = np.array([
+        np.mean([person.values[:3] <= known.mean[:3] for person in random_people(sex, count, seed)], axis=0)
+        for seed in seeds
+    ])  # fmt: skip
+    assert np.all(np.sqrt(np.mean((below - 0.5) ** 2, axis=0)) < 0.05)

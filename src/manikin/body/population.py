@@ -17,6 +17,7 @@ from itertools import product
 
 import numpy as np
 from scipy.special import chdtri, ndtri
+from scipy.stats.qmc import MultivariateNormalQMC, Sobol
 
 from manikin.body.anthropometry import Sex
 from manikin.errors import BodyError
@@ -145,15 +146,8 @@ def boundary_people(
     """
     share = finite_number(share, "share of the people", above=0.0, at_most=0.999, error=BodyError)
     known, chosen = population_statistics(sex), _numbers(measures)
-    deviation = known.deviation[chosen]
-    variances, axes = np.linalg.eigh(
-        known.covariance[np.ix_(chosen, chosen)] / np.outer(deviation, deviation)
-    )
-    variances, axes = variances[::-1], axes[:, ::-1]
-    # The sign of an eigenvector is left open: its largest component is positive, of equal ones the first.
-    largest = np.abs(axes).round(6).argmax(axis=0)
-    axes = axes * np.sign(axes[largest, np.arange(len(chosen))])
-    count = len(chosen)
+    deviation, count = known.deviation[chosen], len(chosen)
+    variances, axes = _components(known, chosen)
     names, directions = [], []
     for number, row in enumerate(np.eye(count)):
         names += [f"axis{number + 1}+", f"axis{number + 1}-"]
@@ -185,9 +179,11 @@ def percentile_person(sex: Sex, percent: float) -> PersonOfPopulation:
 
 
 def random_people(sex: Sex, count: int, seed: int) -> tuple[PersonOfPopulation, ...]:
-    """Random draws; the first ones are the same whatever the count.
+    """Random draws that fill the population evenly; the first ones are the same whatever the count.
 
-    A draw in which a measure is beyond all people of the survey is drawn again: 0.2 % of men, 0.7 % of women.
+    They are the points of a scrambled Sobol sequence, along the principal components of the correlations:
+    shares of people that they estimate are off by about half as much as those of independent draws. A point
+    of which a measure is beyond all people of the survey is left out: 0.2 % of men, 0.7 % of women.
 
     Args:
         sex: Whose statistics.
@@ -195,15 +191,35 @@ def random_people(sex: Sex, count: int, seed: int) -> tuple[PersonOfPopulation, 
         seed: Of the draws.
     """
     known = population_statistics(sex)
-    generator = np.random.default_rng((seed, list(Sex).index(sex)))
-    factor = np.linalg.cholesky(known.covariance)
+    generator, size = np.random.default_rng((seed, list(Sex).index(sex))), len(known.mean)
+    variances, axes = _components(known, range(size))
+    points = MultivariateNormalQMC(np.zeros(size), engine=Sobol(size, rng=generator))
     people: list[PersonOfPopulation] = []
     while len(people) < count:
-        values = known.mean + factor @ generator.standard_normal(len(known.mean))
-        if np.all((known.least <= values) & (values <= known.largest)):
-            name = f"{sex}-draw{seed}-{len(people)}"
-            people.append(PersonOfPopulation(name, sex, frozen_array(values, "person", (6,)), drawn=True))
-    return tuple(people)
+        for point in points.random(BLOCK):
+            values = known.mean + known.deviation * (axes @ (np.sqrt(variances) * point))
+            if np.all((known.least <= values) & (values <= known.largest)):
+                name = f"{sex}-draw{seed}-{len(people)}"
+                people.append(PersonOfPopulation(name, sex, frozen_array(values, "person", (6,)), drawn=True))
+    return tuple(people[:count])
+
+
+BLOCK = 64
+"""Points of a sequence that are made at once; a power of two."""
+
+
+def _components(known: PopulationStatistics, chosen: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """(k,) variances of the principal components of the correlations of k measures, and their (k, k) axes.
+
+    The largest comes first. The sign of an eigenvector is left open: its largest component is positive, of
+    equal ones the first.
+    """
+    deviation = known.deviation[chosen]
+    covariance = known.covariance[np.ix_(chosen, chosen)]
+    variances, axes = np.linalg.eigh(covariance / np.outer(deviation, deviation))
+    variances, axes = variances[::-1], axes[:, ::-1]
+    largest = np.abs(axes).round(6).argmax(axis=0)
+    return variances, axes * np.sign(axes[largest, np.arange(len(chosen))])
 
 
 def _numbers(measures: Sequence[str]) -> list[int]:
