@@ -79,12 +79,12 @@ def growth(call: Callable[[], Any], count: int) -> float:
     """Least growth per call [bytes] in any of the parts of so many calls, after a fifth as many before."""
     for _ in range(max(count // 5, 2)):
         call()
-    used = [_resident()]
+    used = [resident()]
     each = -(-count // PARTS)
     for _ in range(PARTS):
         for _ in range(each):
             call()
-        used.append(_resident())
+        used.append(resident())
     return float(np.diff(used).min()) / each
 
 
@@ -94,7 +94,7 @@ def _reading(name: str, folder: Path) -> Callable[[], Any]:
     return partial(kind.read, kind.write(folder))
 
 
-def _resident() -> int:
+def resident() -> int:
     """Memory of this process that is in use [bytes]."""
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

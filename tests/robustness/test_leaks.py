@@ -4,7 +4,9 @@ import mmap
 import sys
 
 import pytest
-from tests.robustness.leaks import CALLS, MOST, growth, growths
+from tests.robustness.leaks import CALLS, MOST, growth, growths, resident
+
+from manikin.runtime.memory import give_memory_back
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read from /proc")
@@ -33,3 +35,15 @@ def test_a_leak_is_found():
         kept[-1].write(b"x" * size)
 
     assert growth(leak, 8) == pytest.approx(size, rel=0.05)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read from /proc")
+def test_memory_between_what_is_kept_is_given_back():
+    """A hundred thousand pieces of 1 kB, of which each hundredth is kept: holes of 100 kB."""
+    pieces = [bytes(1024) for _ in range(100_000)]
+    kept = pieces[::100]
+    del pieces
+    before = resident()
+    give_memory_back()
+    assert len(kept) == 1000
+    assert resident() < before - 50e6

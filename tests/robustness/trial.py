@@ -15,7 +15,7 @@ import numpy as np
 from tests.robustness.samples import DAMAGED, FORMATS, Format
 
 from manikin.errors import InputError, ManikinError
-from manikin.runtime.child import limit_memory
+from manikin.runtime.memory import limit_memory
 
 LONGEST = 30
 """Time in which every file is read or refused [s]."""

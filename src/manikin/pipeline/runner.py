@@ -36,6 +36,7 @@ from manikin.pipeline.stages.whole_body_stage import (
     with_stricter_key_postures,
 )
 from manikin.planning.whole_body import WholeBodySettings
+from manikin.runtime.memory import give_memory_back
 from manikin.scenarios import Scenario, load_scenario
 
 
@@ -68,7 +69,10 @@ def run(
         began = clock.perf_counter()
         context = RunContext.of(job, settings)
         report = Report(context, out, progress, began)
-        return _follow_the_road(context, report, requirements or ExecutionRequirements())
+        try:
+            return _follow_the_road(context, report, requirements or ExecutionRequirements())
+        finally:
+            give_memory_back()
 
 
 def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequence[str]) -> Scenario:

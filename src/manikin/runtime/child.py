@@ -3,7 +3,6 @@
 import os
 import threading
 import time
-from pathlib import Path
 
 PARENT = "MANIKIN_PARENT"
 """Variable of the environment that names the process which a command ends with."""
@@ -31,14 +30,3 @@ def end_with(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-
-
-def limit_memory(more: int) -> None:
-    """Let this process use so many bytes more than it does now, and no more; OSError on another system."""
-    try:
-        import resource
-    except ImportError as error:
-        raise OSError(f"memory cannot be limited here: {error}") from None
-    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[0]
-    most = int(pages) * os.sysconf("SC_PAGE_SIZE") + more
-    resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))

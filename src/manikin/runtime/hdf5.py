@@ -14,7 +14,7 @@ from pathlib import Path
 
 import h5py
 
-from manikin.runtime.child import limit_memory
+from manikin.runtime.memory import limit_memory
 
 USER_BLOCK = 512
 """Bytes before the HDF5 content."""
