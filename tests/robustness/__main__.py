@@ -90,10 +90,10 @@ def _leaks(count: int) -> int:
 
 def _determinism() -> int:
     names = (*SMALL, *LARGE)
-    first, second = in_new_process(names, hash_seed=1), in_new_process(names[::-1], hash_seed=2)
+    first, second = in_new_process(names, number=1), in_new_process(names[::-1], number=2)
     found = [name for name in names if first[name] != second[name]]
     for name in found:
-        print(f"{name}: differs by what was planned before, or by hashes")
+        print(f"{name}: differs by what was planned before, by hashes, threads, language or place")
     print(f"{len(names)} plans, {len(found)} findings")
     return 1 if found else 0
 

@@ -1,4 +1,4 @@
-"""Plans that are the same to the last bit, whatever the process did before and however it hashes.
+"""Plans that are the same to the last bit, whatever the process did before, however it hashes, and where.
 
 ``python -m tests.robustness.determinism NAME...`` makes them in this order, in a process of its own, and
 prints a digest of each as JSON.
@@ -9,6 +9,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -64,12 +65,20 @@ def in_this_process(names: Sequence[str]) -> dict[str, str]:
     return {name: digest((SMALL | LARGE)[name]()) for name in names}
 
 
-def in_new_process(names: Sequence[str], hash_seed: int) -> dict[str, str]:
-    """Digest of each plan, made in this order by a process that did nothing before."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.robustness.determinism", *names], cwd=Path(__file__).parents[2],
-        env={**os.environ, "PYTHONHASHSEED": str(hash_seed)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+def in_new_process(names: Sequence[str], number: int) -> dict[str, str]:
+    """Digest of each plan, made in this order by a process that did nothing before.
+
+    The number is its hash seed and how many threads it may use; it works in a directory of its own and,
+    if it is even, in another language and at another place on earth.
+    """
+    paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+    place = {"LC_ALL": "C", "TZ": "Asia/Tokyo"} if number % 2 == 0 else {}
+    given = {"PYTHONPATH": paths, "PYTHONHASHSEED": str(number), "OMP_NUM_THREADS": str(number), **place}
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-m", "tests.robustness.determinism", *names], cwd=folder,
+            env={**os.environ, **given}, capture_output=True, text=True, check=False,
+        )  # fmt: skip
     if done.returncode != 0:
         raise RuntimeError(done.stderr[-2000:])
     return json.loads(done.stdout.splitlines()[-1])
