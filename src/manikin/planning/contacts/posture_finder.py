@@ -25,7 +25,7 @@ from manikin.kinematics.posture_terms import BESIDE, GRASPING, NEARBY, SINKING
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.contact_plan import Contacts
 from manikin.scene import Proximity, Scene
-from manikin.scene.distance import Ignored
+from manikin.scene.distance import NOTHING, Ignored
 
 ROOT = 7  # numbers of a posture that are the pose of its root
 EASING_MOVES, EASING_TURN = 8, (0.3, 0.03)
@@ -36,6 +36,8 @@ LIKE_BEFORE = Preferences(hinges={}, pelvis=0.0, trunk=0.0, head=0.0, arms=0.0)
 BETWEEN, CROSSED = (0.25, 0.5, 0.75), 0.005
 """Shares of a way between postures at which parts of the body are tested, and how deep they may be in each
 other there, as a motion bends round a little [m]; our choice."""
+STAYING, ARM = ("pelvis", "lumbar", "thorax", "neck", "head", "upper_arm"), "arm"
+"""Ends of the names of segments that steps take round nothing, and what names of arms contain."""
 LEARNT_MARGIN = 0.01  # angle that such postures keep to the surface of a learnt volume [rad]; our choice
 
 
@@ -190,17 +192,35 @@ class PostureFinder:
         least = self.settings.clearance + shape.size[0]
         return bool(self.scene.distance_beside(contact.position, self._touched(contact)) >= least)
 
-    def crossing(self, *postures: FloatArray) -> str:
-        """Parts of the body that straight ways from posture to posture take through each other; or empty."""
+    def crossing(self, *postures: FloatArray, deeper: float = CROSSED, step: bool = False) -> str:
+        """What straight ways from posture to posture take through each other by more than a depth; or empty.
+
+        It is parts of the body; of a ``step``, in which a foot goes round others and obstacles, also trunk,
+        head or upper arms and an obstacle, and no legs with each other.
+        """
         model = self.body.pinocchio
         ways = [pin.interpolate(model, *pair, share) for pair in pairwise(postures) for share in BETWEEN]
-        found = self._own.minimum_over(np.array(ways), tolerance=1e-3)
-        return " and ".join(found.pair or ()) if found.distance < -CROSSED else ""
+        proximity, ignored = (self._proximity, self._of_steps) if step else (self._own, NOTHING)
+        found = proximity.minimum_over(np.array(ways), ignored, tolerance=1e-3)
+        return " and ".join(found.pair or ()) if found.distance < -deeper else ""
 
     @cached_property
     def _own(self) -> Proximity:
         """Distances between parts of the body alone."""
         return Proximity(self.body, Scene((), None))
+
+    @cached_property
+    def _of_steps(self) -> Ignored:
+        """Pairs of which a step takes one round the other."""
+        own = frozenset(self._own.pairs)
+
+        def stays(name: str) -> bool:
+            return name.partition("/")[0].endswith(STAYING)
+
+        return frozenset(
+            (first, second) for first, second in self._proximity.pairs
+            if not stays(first) and not ((first, second) in own and (stays(second) or ARM in first + second))
+        )  # fmt: skip
 
     def eased(
         self, posed: Posed, held: Contacts, carrying: Contacts,

@@ -42,6 +42,7 @@ HIGH = 0.3  # step at which hands may join as soon as feet alone do not make it,
 HIGH_TRIES = 2  # ways after which a high step without a posture closes all that are much like it
 HAND_TRIES = 4  # ways that feet alone do not make after which hands may join at any step
 DEEP_INSET = 0.02  # of the centre of mass as a body that turned round carries on a hand, at 1.75 m [m]
+CROSSED = 0.03  # depth to which straight ways of a high step may cross something; our choice [m]
 HOLDS = 6  # most places of hands that are tried at a step
 
 
@@ -275,6 +276,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         for _ in self._leniencies():
             for changes, held, start in self._hands_before(feet, before, after, hands, q):
                 made, landed = self._step(feet, before, after, start, held)
+                high = held or hands or self._rise(before, after) > HIGH * self._scale
+                if landed.q is not None and high:
+                    ways = q, *(stage.q for stage in (*changes, *made))
+                    if crossed := self.poser.crossing(*ways, deeper=CROSSED, step=True):
+                        landed = Posed(None, f"{crossed} pass through each other on the way to a step")
                 if landed.q is not None:
                     return changes, held, made, landed
                 failed = failed or (made, landed)
@@ -289,7 +295,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         standing = {foot.effector: foot for foot in feet[:2]}
         bare = self._left({**standing, **hands}, before, hands, q)
         start = bare[-1].q if bare else q
-        rise = np.ptp([hold.position[2] for place in (before, after) for hold in (place.left, place.right)])
+        rise = self._rise(before, after)
         deep = bool(rise > HELD_HIGHEST * self._scale)  # where a hand carries if one can
         if bare is not None and not deep:
             yield bare, {}, start
@@ -317,6 +323,12 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
                 stages.append(Stage.of(self.poser.body, both, at, self.settings.reach_duration))
             else:
                 yield stages, held, at
+
+    @staticmethod
+    def _rise(before: _Stand, after: _Stand) -> float:
+        """Height between the lowest and the highest foothold of a step [m]."""
+        holds = (hold for place in (before, after) for hold in (place.left, place.right))
+        return float(np.ptp([hold.position[2] for hold in holds]))
 
     def _left(self, contacts: Contacts, place: _Stand, hands: Contacts, q: FloatArray) -> list[Stage] | None:
         """Stages in which hands leave one after the other; None where they cannot."""
