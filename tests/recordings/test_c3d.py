@@ -1,6 +1,7 @@
 """C3D files: places, gaps, plates and events of one written here, the real ones, and damaged copies."""
 
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from manikin.errors import InputError
 from manikin.recordings import read_c3d, read_recording
-from manikin.recordings.readers.c3d_layout import c3d_frames, c3d_layout
+from manikin.recordings.readers.c3d_layout import Parameter, c3d_frames, c3d_layout, of_long_trial
 
 CORNERS = [[0.6, 0.4, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 0.0], [0.6, 0.0, 0.0]]
 """Of the plate, in the order of the format: (+x, +y) of the plate's own axes first [m]."""
@@ -188,6 +189,24 @@ def test_offsets_of_unsigned_channels_are_unsigned():
         _, found = c3d_frames(content, c3d_layout(content, "small.c3d"))
         np.testing.assert_allclose(found[0] - plain[0], moved)
         np.testing.assert_array_equal(found[1:], plain[1:])
+
+
+def test_frames_beyond_the_header_are_those_of_the_trial():
+    """70000 frames from number 66000 on; the header has no number above 65535, and is the truth below it."""
+    content = c3d_bytes(*small())
+    layout = c3d_layout(content, "small.c3d")
+    words = {"START": 66000, "END": 135999}
+    parameters = {
+        ("TRIAL", f"ACTUAL_{name}_FIELD"): Parameter(2, (2,), np.array([value], "<u4").tobytes())
+        for name, value in words.items()
+    }
+    long = replace(layout, parameters={**layout.parameters, **parameters})
+    found = of_long_trial(long, 65535)
+    assert (found.first_frame, found.frames) == (66000, 70000)
+    assert of_long_trial(long, 65534) is long
+    told = Parameter(4, (), np.float32(70000.0).tobytes())
+    other = replace(layout, parameters={**layout.parameters, ("POINT", "FRAMES"): told})
+    assert of_long_trial(other, 65535).frames == 70000
 
 
 # --- broken files -------------------------------------------------------------------------------

@@ -53,6 +53,25 @@ def test_what_is_right_stays_bit_for_bit(walk):
     assert repairs == ()
 
 
+def test_a_landing_and_a_quick_kick_stay_as_they_are(walk):
+    """A fall of 0.3 s that ends from one frame to the next, and a knee that turns out and back in 0.2 s."""
+    slow = replace(walk, rate=30.0)
+    time, places, rotations = slow.time, np.array(walk.root_positions), np.array(walk.rotations)
+    fallen = np.clip(time - 1.0, 0.0, 0.3)
+    places[:, 2] -= 0.5 * 9.81 * fallen**2
+    landing = replace(slow, root_positions=places)
+    assert without_joint_jumps(landing)[0] is landing
+    knee = walk.joint_names.index("right_leg")
+    angle = 1.2 * np.exp(-(((time - 2.0) / 0.08) ** 2))
+    rotations[:, knee] = (
+        rotations[:, knee] @ Rotation.from_rotvec(angle[:, None] * [0.0, 1.0, 0.0]).as_matrix()
+    )
+    kick = replace(slow, rotations=rotations)
+    cleaned, repairs = without_joint_jumps(kick)
+    assert [one for one in repairs if one.outcome == "filled"] == []
+    np.testing.assert_array_equal(cleaned.rotations, kick.rotations)
+
+
 @pytest.mark.parametrize("joint", JOINTS)
 @pytest.mark.parametrize(("first", "count"), [(0, 1), (40, 1), (90, 3), (131, 5)])
 def test_short_runs_are_filled(walk, joint, first, count):

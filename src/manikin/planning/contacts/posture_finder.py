@@ -195,8 +195,8 @@ class PostureFinder:
     def crossing(self, *postures: FloatArray, deeper: float = CROSSED, step: bool = False) -> str:
         """What straight ways from posture to posture take through each other by more than a depth; or empty.
 
-        It is parts of the body; of a ``step``, in which a foot goes round others and obstacles, also trunk,
-        head or upper arms and an obstacle, and no legs with each other.
+        It is parts of the body. Of a ``step``, in which limbs go round each other and round obstacles, it is
+        trunk, head or upper arms and anything else, or forearms and the body.
         """
         model = self.body.pinocchio
         ways = [pin.interpolate(model, *pair, share) for pair in pairwise(postures) for share in BETWEEN]

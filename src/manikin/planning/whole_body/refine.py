@@ -183,17 +183,18 @@ class _RefineGoal:
 
     @property
     def content(self) -> str:
-        """What the fit of the part follows from, whenever it begins, to 1e-9 s, m and rad."""
+        """What is done in the part, whenever it begins, to 1e-9 s, m and rad, and what is held beside it."""
         first, last = self.span
         instants, keys = self.schedule.instants[first : last + 1], self.path.time
         begin, end = self.interval
         inside = (keys > begin + 1e-9) & (keys < end - 1e-9)
-        phases = ContactSchedule(StanceSequence(self.schedule.sequence.phases[first:last]), instants)
+        around = self.schedule.sequence.phases[max(first - 1, 0) : last + 1]
+        phases = ContactSchedule(StanceSequence(around), np.arange(len(around) + 1.0))
         postures = np.vstack([self.path.at(instants), self.path.q[inside]])
         return json.dumps([
             describe_schedule(phases)["phases"], (instants - begin).round(9).tolist(),
             (keys[inside] - begin).round(9).tolist(), postures.round(9).tolist(),
-            [end is None for end in self.ends], self.job.padded,
+            [end is None for end in self.ends], first > 0, self.job.padded,
         ])  # fmt: skip
 
     @property
@@ -305,14 +306,21 @@ class Refinement:
         progress((ends[0] - start + share * (ends[1] - ends[0])) / (ends[2] - start))
 
     def _part(self, goal: _RefineGoal, known: FittedParts, progress: Progress) -> FitAttempt[_RefineGoal]:
-        """The best motion of a part: that of the same part in another plan, or a new one."""
+        """The best motion of a part: that of the same part in another plan if it holds here, or a new one."""
         if goal.is_whole:
             return self._fitted(goal, progress)
         content = goal.content
-        if content not in known:
-            known[content] = self._fitted(goal, progress)
-            return known[content]
-        found, (first, last) = known[content], goal.span
+        part = self._taken_over(goal, known[content]) if content in known else None
+        if part is None or part.broken:
+            part = self._fitted(goal, progress)
+        if not part.broken:
+            known[content] = part
+        return part
+
+    @staticmethod
+    def _taken_over(goal: _RefineGoal, found: FitAttempt[_RefineGoal]) -> FitAttempt[_RefineGoal]:
+        """The same part of another plan, in the time of this one, measured anew."""
+        first, last = goal.span
         before = goal.schedule.instants
         its = found.goal.schedule.instants[found.goal.span[0] : found.goal.span[1] + 1]
         mine = before[first] + its - its[0]

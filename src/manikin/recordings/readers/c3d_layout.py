@@ -9,7 +9,7 @@ the origin of its sensors, which lie deeper; some programs write the opposite si
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 from types import MappingProxyType
 from typing import Any
@@ -55,6 +55,7 @@ def plate_load(
 
 
 BLOCK, _FASTEST = 512, 1e6
+_LAST, _MOST_FRAMES = 65535, 1e9  # the largest number of a frame in the header
 _INTEL, _DEC, _MIPS = 84, 85, 86
 _SIZES = {-1: 1, 1: 1, 2: 2, 4: 4}
 _TEXT, _INTEGERS, _REAL = -1, (1, 2), 4
@@ -143,8 +144,8 @@ class C3dLayout:
         return self.integers(group, name).astype(np.float64) if whole else self.reals(group, name)
 
     def real(self, group: str, name: str) -> float:
-        """First value of a real parameter, 0 where it is missing; InputError for other types."""
-        return float(next(iter(self.reals(group, name)), 0.0))
+        """First value of a parameter, 0 where it is missing; InputError for texts."""
+        return float(next(iter(self.numbers(group, name)), 0.0))
 
     def texts(self, group: str, name: str) -> list[str]:
         """Texts of a parameter, without what pads them; none where it is missing or a number."""
@@ -175,9 +176,9 @@ class C3dLayout:
 def _text(raw: bytes) -> str:
     """Text in UTF-8, or else in Latin-1, as older programs write."""
     try:
-        return raw.decode().strip("\0 ")
+        return raw.split(b"\0", 1)[0].decode().strip()
     except UnicodeDecodeError:
-        return raw.decode("latin-1").strip("\0 ")
+        return raw.split(b"\0", 1)[0].decode("latin-1").strip()
 
 
 def _reals(raw: bytes, processor: int) -> FloatArray:
@@ -240,6 +241,7 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
         MappingProxyType(_parameters(content[:end], start + 4, big_endian, file)),
         float(_reals(content[20:24], processor)[0]), begin, negative,
     )  # fmt: skip
+    layout = of_long_trial(layout, last)
     _check_counts(layout, measured)
     wanted = layout.frames * (4 * points + measured) * (4 if negative else 2)
     if begin < end:
@@ -250,6 +252,21 @@ def c3d_layout(content: bytes, file: str) -> C3dLayout:
             f"{begin + wanted} bytes (is it cut short?)",
         )
     return layout
+
+
+def of_long_trial(layout: C3dLayout, last: int) -> C3dLayout:
+    """The layout with the frames that parameters tell where the header has no room for their number."""
+    if last < _LAST:
+        return layout
+    first, end = (
+        layout.integers("TRIAL", f"ACTUAL_{name}_FIELD") @ [1, _LAST + 1]
+        if layout.count("TRIAL", f"ACTUAL_{name}_FIELD") == 2 else 0
+        for name in ("START", "END")
+    )  # fmt: skip
+    if 0 < first <= end:
+        return replace(layout, first_frame=int(first), frames=int(end - first + 1))
+    told = layout.real("POINT", "FRAMES")
+    return replace(layout, frames=int(told)) if layout.frames < told < _MOST_FRAMES else layout
 
 
 def _check_counts(layout: C3dLayout, measured: int) -> None:
@@ -273,7 +290,7 @@ def _check_counts(layout: C3dLayout, measured: int) -> None:
         raise layout.error(f"ANALOG:RATE is {analog_rate:g} Hz", f"{rate * layout.samples:g}")
     if not layout.real_frames and not layout.count("POINT", "SCALE"):
         raise layout.error("no POINT:SCALE of whole numbers", "a complete file")
-    if np.any(layout.integers("ROTATION", "USED")):
+    if np.any(layout.numbers("ROTATION", "USED")):
         raise layout.error("holds rotations of segments", "markers")
 
 

@@ -48,7 +48,7 @@ LARGEST = 1e12
 
 
 MOST_BYTES = 400_000_000
-"""Largest file that is read; an hour of sixty markers at 100 Hz is half as large as a C3D file."""
+"""Largest file that is read [bytes]: an hour of sixty markers at 100 Hz in a C3D file of reals."""
 
 MOST_TEXT = 200_000_000
 """Largest text that is read [bytes]: its numbers take several times as much memory."""

@@ -22,17 +22,20 @@ from manikin.recordings.reconstruction.cleaning import Repair
 SMALLEST_TURN, SMALLEST_MOVE = 0.08, 0.02
 """Least part of a step of a joint [rad] and of the root [m] that is a jump."""
 
+TURNING, MOVING = 500.0, 150.0
+"""Accelerations of a joint [rad/s^2] and of the root [m/s^2], as of kicks and landings, that are no jump."""
+
 USUAL_QUANTILE, TIMES_USUAL = 0.9, 8.0
 """Quantile of a joint's deviations from the steps around that is usual, and multiple that is a jump."""
 
 AROUND = 3
 """Steps on either side of one that it is compared with."""
 
-ACROSS = 0.5
-"""Share of a jump that steps across the frames left out may be off."""
+ACROSS, BACK = 0.5, 0.5
+"""Share of a jump that steps across the frames left out may be off, and that has to lead back."""
 
 FAR = 0.45
-"""Jump [rad], [m] from which on more than one frame at an end is filled, with what is next to it."""
+"""Jump [rad], [m] from which on frames at an end are filled, with what is next to it."""
 
 MOVED = 0.1
 """Jump of the farthest joint that one carries from which on it is told where it stays as recorded [m]."""
@@ -44,12 +47,11 @@ def without_joint_jumps(recording: Recording) -> tuple[Recording, tuple[Repair, 
         return recording, ()
     rotations, places = np.array(recording.rotations), np.array(recording.root_positions)
     found = list[Repair]()
-    longest = max(int(LONGEST_GAP * recording.rate), 1)
     for joint, (name, levers) in enumerate(zip(recording.joint_names, _levers(recording), strict=True)):
         path = _JointPath(rotations[:, joint], levers)
-        found += _cleaned(path, name, longest)
+        found += _cleaned(path, name, recording.rate)
         rotations[:, joint] = path.values
-    found += _cleaned(_RootPath(places), recording.joint_names[0], longest)
+    found += _cleaned(_RootPath(places), recording.joint_names[0], recording.rate)
     if not found:
         return recording, ()
     ordered = tuple(sorted(found, key=lambda one: (one.first, one.stop)))
@@ -70,7 +72,7 @@ def _levers(recording: Recording) -> list[FloatArray]:
 class _JointPath:
     """(n, 3, 3) rotations of a joint, whose steps are rotation vectors in its own frame [rad]."""
 
-    smallest = SMALLEST_TURN
+    smallest, fastest = SMALLEST_TURN, TURNING
 
     def __init__(self, values: FloatArray, levers: FloatArray) -> None:
         self.values, self.levers = values, levers
@@ -89,7 +91,7 @@ class _JointPath:
 class _RootPath:
     """(n, 3) places of the root, whose steps are vectors [m]."""
 
-    smallest = SMALLEST_MOVE
+    smallest, fastest = SMALLEST_MOVE, MOVING
 
     def __init__(self, values: FloatArray) -> None:
         self.values, self.levers = values, np.ones(len(values))
@@ -104,21 +106,25 @@ class _RootPath:
         self.values[first:stop] = (1.0 - share) * self.values[first - 1] + share * self.values[stop]
 
 
-def _cleaned(path: _JointPath | _RootPath, name: str, longest: int) -> list[Repair]:
+def _cleaned(path: _JointPath | _RootPath, name: str, rate: float) -> list[Repair]:
     """Fill runs of a path's frames that lie between jumps, in place."""
-    count = len(path.values)
+    count, longest = len(path.values), max(int(LONGEST_GAP * rate), 1)
     every = np.arange(count)
     steps = path.steps(every[:-1], every[1:])
     usual = _usual_steps(steps)
-    off = np.linalg.norm(steps - usual, axis=1)
-    least = max(path.smallest, TIMES_USUAL * float(np.quantile(off, USUAL_QUANTILE)))
+    beyond = steps - usual
+    off = np.linalg.norm(beyond, axis=1)
+    usually = float(np.quantile(off, USUAL_QUANTILE))
+    least = max(path.smallest, path.fastest / rate**2, TIMES_USUAL * usually)
     jumps, found = list(map(int, np.flatnonzero(off > least))), list[Repair]()
     while jumps:
         first = jumps.pop(0)
-        stop = next((last for last in jumps if _leads_across(path, usual, off, first, last, longest)), None)
+        stop = next(
+            (last for last in jumps if _leads_across(path, usual, beyond, first, last, longest)), None
+        )
         size = float(off[first])
         moved = size * float(path.levers[first])
-        edge = longest if size > FAR else 1
+        edge = longest if size > FAR else 0
         if stop is not None:  # frames between the two steps
             path.fill(first + 1, stop + 1)
             jumps = [one for one in jumps if one > stop]
@@ -146,11 +152,12 @@ def _usual_steps(steps: FloatArray) -> FloatArray:
 
 
 def _leads_across(
-    path: _JointPath | _RootPath, usual: FloatArray, off: FloatArray, first: int, last: int, longest: int
+    path: _JointPath | _RootPath, usual: FloatArray, beyond: FloatArray, first: int, last: int, longest: int
 ) -> bool:
-    """Whether the frames between two steps may be left out."""
-    if last - first > longest:
+    """Whether the frames between two steps, there and back, may be left out."""
+    size = min(float(np.linalg.norm(beyond[step])) for step in (first, last))
+    if last - first > longest or float(beyond[first] @ beyond[last]) > -BACK * size**2:
         return False
     across = path.steps(np.array([first]), np.array([last + 1]))[0]
     expected = 0.5 * (last + 1 - first) * (usual[first] + usual[last])
-    return float(np.linalg.norm(across - expected)) < ACROSS * min(off[first], off[last])
+    return float(np.linalg.norm(across - expected)) < ACROSS * size
