@@ -20,7 +20,7 @@ LARGEST_LOAD, FASTEST_BODY, FASTEST_LIMB = 20.0, 15.0, 30.0
 """External force per body weight, speeds of the centre of mass, and of hands and feet [m/s]: nobody's."""
 
 LARGEST_TURNING = 5.0
-"""Moment about the centre of mass per body weight that nobody's motion needs [m]: gymnasts need about 1."""
+"""Moment about the centre of mass per body weight that nobody's motion needs [m]; our choice."""
 
 LONGEST_FALL = 0.5
 """Time without any support that a jump of a person may last [s]."""

@@ -23,7 +23,7 @@ SMALLEST_TURN, SMALLEST_MOVE = 0.08, 0.02
 """Least part of a step of a joint [rad] and of the root [m] that is a jump."""
 
 TURNING, MOVING = 500.0, 150.0
-"""Accelerations of a joint [rad/s^2] and of the root [m/s^2], as of kicks and landings, that are no jump."""
+"""Accelerations of a joint [rad/s^2] and of the root [m/s^2] up to which nothing is a jump; our choice."""
 
 USUAL_QUANTILE, TIMES_USUAL = 0.9, 8.0
 """Quantile of a joint's deviations from the steps around that is usual, and multiple that is a jump."""
