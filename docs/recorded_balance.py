@@ -53,8 +53,7 @@ from manikin.recordings import (
 from manikin.recordings.dynamics.plate_forces import JOINTS, UNSURE, compare_torques
 from manikin.recordings.dynamics.recorded_dynamics import (
     CUTOFF,
-    TOUCH_DOWN_CUTOFF,
-    TOUCH_DOWN_WIDTH,
+    HEIGHT_CUTOFF,
     margins_of_wrenches,
 )
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
@@ -96,11 +95,13 @@ TEXT = f"""# Balance of recorded people
 
 Stances, forces, torques and margins of recorded people (Qiu 2012, 4.4), beside force plates, by
 `docs/recorded_balance.py`. Soles are those of the body model, whole, level, at one place for each support,
-friction {FRICTION:g}; postures are low-passed at {CUTOFF:g} Hz (second order, no delay), rising to
-{TOUCH_DOWN_CUTOFF:g} Hz within {1e3 * TOUCH_DOWN_WIDTH:.0f} ms of a touch-down, the same for all files, and
+friction {FRICTION:g}; postures are low-passed at {CUTOFF.usual:g} Hz (second order, no delay), rising to
+{CUTOFF.highest:g} Hz within {1e3 * CUTOFF.width:.0f} ms of a touch-down beside another support, the height
+of their centre of mass at {HEIGHT_CUTOFF.usual:g} to {HEIGHT_CUTOFF.highest:g} Hz, all files alike, and
 differentiated twice. Segment masses lie off the lines between joints (Dumas, Chèze and Verriest, 2007), a
-trunk without markers tilts so that its upper end has a third of the pelvis' fast motion. Nothing
-is fitted to the plates but the mass of the person; the cutoff at touch-downs was chosen with them.
+trunk without markers tilts so that its upper end has a third of the pelvis' fast motion.
+Nothing is fitted to the plates but the mass of the person; the cutoffs were
+chosen with them.
 
 `manikin analyze` measures the motion as recorded. *Shifted* is the whole body moved by the smooth path
 that is least and leaves the centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if
@@ -205,7 +206,7 @@ class Loss:
 
 def balance_losses(
     margins: RecordedMargins, dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0,
-    neutral: Sequence[str] = (), cutoff: float = CUTOFF,
+    neutral: Sequence[str] = (), cutoff: float = CUTOFF.usual,
 ) -> tuple[Loss, ...]:  # fmt: skip
     """Every frame without a positive margin of the whole body, with its cause.
 

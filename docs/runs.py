@@ -209,9 +209,9 @@ def run_of(file: str, folder: Path) -> Run | None:
     alone, supports = supports_of(found, with_force=False), supports_of(found)
     downs = touch_downs_of(supports)
     free = [one for one in supports.phases if not one.effectors]
-    offs = tuple(one.start - supports.start for one in free if one.start > supports.start)
+    landings = tuple(one.end - supports.start for one in free if one.end < supports.end)
     motions = (
-        dynamics_of(found, touch_downs=(*downs, *offs)),
+        dynamics_of(found, touch_downs=(*downs, *landings)),
         dynamics_of(found, 8.0),
         dynamics_of(found, 10.0),
     )
@@ -301,7 +301,7 @@ def by_recording(runs: Sequence[Run]) -> str:
 
 def by_cutoff(runs: Sequence[Run]) -> str:
     """One row for each low-pass and rate."""
-    names = ("5 Hz, 8 Hz at touch-downs (used)", "and 8 Hz at lift-offs into flight", "8 Hz", "10 Hz")
+    names = ("5 Hz, more at touch-downs of walks (used)", "and at those from flights", "8 Hz", "10 Hz")
     rows = []
     for name, number in zip(names, range(len(names)), strict=True):
         for rate in (120, 30):

@@ -1,5 +1,6 @@
 """One recording measured from beginning to end."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -231,7 +232,7 @@ def test_plates_that_carry_another_mass_than_the_file_tells_are_remarked(recordi
     found = analyze_file(path)
     assert found.body.mass == pytest.approx(66.5)
     assert found.as_dict()["force_plates"]["mass_kg"] == pytest.approx(61.3, abs=0.3)
-    assert any("carry 61.3 kg, not 66.5 kg" in line for line in found.remarks)
+    assert any(re.search(r"carry 61\.\d kg, not 66\.5 kg", line) for line in found.remarks)
     lighter = analyze_file(path, AnalysisOptions(mass=61.3))
     assert not any("carry" in line for line in lighter.remarks)
 

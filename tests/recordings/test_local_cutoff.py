@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
-from manikin.recordings.dynamics.recorded_dynamics import local_cutoff, smooth
+from manikin.recordings.dynamics.recorded_dynamics import CUTOFF, LocalCutoff, smooth
 
 RATE = 100.0
 TIME = np.arange(400) / RATE
@@ -27,11 +27,11 @@ def test_one_cutoff_is_the_filter_of_second_order_without_delay(frequency, cutof
 @given(slope=st.floats(-10.0, 10.0), start=st.floats(-5.0, 5.0), instants=st.lists(st.floats(0.0, 4.0)))
 def test_a_straight_line_stays(slope, start, instants):
     line = (start + slope * TIME)[:, None]
-    np.testing.assert_allclose(smooth(line, RATE, local_cutoff(TIME, instants, 5.0)), line, atol=1e-8)
+    np.testing.assert_allclose(smooth(line, RATE, LocalCutoff(5.0, 8.0).at(TIME, instants)), line, atol=1e-8)
 
 
 def test_the_cutoff_is_highest_at_touch_downs():
-    cutoff = local_cutoff(TIME, (1.0, 1.1), 5.0)
+    cutoff = LocalCutoff(5.0, 8.0).at(TIME, (1.0, 1.1))
     assert cutoff.max() == pytest.approx(8.0)
     assert cutoff[108] == pytest.approx(5.0 + 3.0 * np.exp(-(0.02**2) / 0.08**2))
     np.testing.assert_allclose(cutoff[200:], 5.0, atol=1e-12)
@@ -43,14 +43,13 @@ def test_an_impact_is_seen_sharper_and_noise_elsewhere_is_not():
     fall = (np.cumsum(speed) / RATE)[:, None]
     accelerations = [
         np.gradient(np.gradient(smooth(fall, RATE, cutoff)[:, 0], 1 / RATE), 1 / RATE)
-        for cutoff in (np.full(400, 5.0), local_cutoff(TIME, (2.0,), 5.0))
+        for cutoff in (np.full(400, 5.0), CUTOFF.at(TIME, (2.0,)))
     ]
     truth = np.where(TIME < 2.0, -1.0, 0.0)
     errors = [np.sqrt(np.mean((one - truth)[150:250] ** 2)) for one in accelerations]
     assert errors[1] < 0.8 * errors[0]
     noise = np.random.default_rng(1).normal(size=(400, 1))
     far = [
-        smooth(noise, RATE, cutoff)[50:150].std()
-        for cutoff in (np.full(400, 5.0), local_cutoff(TIME, (2.0,), 5.0))
+        smooth(noise, RATE, cutoff)[50:150].std() for cutoff in (np.full(400, 5.0), CUTOFF.at(TIME, (2.0,)))
     ]
     assert far[1] == pytest.approx(far[0], rel=1e-3)

@@ -38,6 +38,7 @@ from manikin.recordings import (
     with_mass,
     without_offsets,
 )
+from manikin.recordings.dynamics.plate_forces import compare_foot_forces
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
 from manikin.recordings.reconstruction.reconstruct import unmeasured_upright
 from manikin.recordings.supports.body_supports import Support
@@ -243,6 +244,30 @@ def test_plates_under_both_feet_tell_the_mass(swinging, dynamics):
     assert shown.cop_rms < 1e-3
 
 
+def test_the_force_of_a_foot_is_compared_by_components(swinging, dynamics):
+    """A plate that feels what the foot does, with 20 N more ahead, and 5 N.m about the vertical."""
+    alone = on_feet(swinging).sequence[0].stance["left_foot"]
+    schedule = ContactSchedule(StanceSequence([Phase(Stance([alone], 3200.0), 3.0)]), [0.0, 3.0])
+    motion = motion_on_contacts(dynamics, schedule)
+    way = dynamics.com[-1, :2] - dynamics.com[0, :2]
+    assert np.linalg.norm(way) > 1e-6
+    ahead = np.array([*(20.0 * way / np.linalg.norm(way)), 0.0, 0.0, 0.0, 0.0])
+    weight = GRAVITY * dynamics.body.mass
+    for more, component, apart in (
+        (np.zeros(6), "up", 0.0), (ahead, "ahead", 20.0 / weight),
+        (np.array([0.0, 0.0, 0.0, 0.0, 0.0, 5.0]), "free moment", 5.0 / weight),
+    ):  # fmt: skip
+        plate = replace(plate_of(dynamics, 1.0, SQUARE), wrenches=dynamics.wrench + more)
+        measured = plate_forces([plate], TIME, schedule, cutoff=40.0)
+        found = {one.component: one for one in compare_foot_forces(dynamics, motion, measured)}
+        assert {one.frames for one in found.values()} == {FRAMES}
+        assert found[component].rms == pytest.approx(apart, abs=1e-4)
+        assert found["up"].r == pytest.approx(1.0, abs=1e-3)
+        others = [one.rms for name, one in found.items() if name not in (component, "free moment")]
+        assert max(others) < 1e-4
+    assert compare_foot_forces(dynamics, motion, plate_forces([plate], TIME, on_feet(swinging))) == ()
+
+
 def test_a_foot_beside_the_plate_is_not_covered(swinging, dynamics):
     beyond = SQUARE + np.array([1.0, 0.0, 0.0])
     measured = plate_forces([plate_of(dynamics, 1.0, beyond)], TIME, on_feet(swinging))
@@ -339,26 +364,29 @@ def analysed(path, frames=None):
 
 
 @pytest.mark.parametrize(
-    ("file", "mass", "cop", "positive", "shift"),
+    ("file", "mass", "cop", "positive", "shift", "vertical"),
     [
-        # The bar of the centre of pressure is 3 cm, that of the share of frames in balance 97 % once shifted.
-        ("btkdata/PiG_Motion-FlatFoot-One.c3d", 61.3, 0.030, 0.94, 0.003),
+        # The bar of the centre of pressure is 3 cm, that of the share of frames in balance 97 % once shifted,
+        # that of the vertical force of level walking 3.5 % of the weight; 6 % of single trials of others.
+        ("btkdata/PiG_Motion-FlatFoot-One.c3d", 61.3, 0.030, 0.94, 0.003, 0.06),
         # No marker tells where trunk and arms are.
-        ("btkdata/FunctionalWalk.c3d", 60.5, 0.030, 0.87, 0.002),
-        pytest.param("nimble_opencap_s4/walkingTO1.trc", 63.7, 0.030, 0.99, 0.002, marks=pytest.mark.long),
-        pytest.param("opensim_core/walking2.c3d", 66.6, 0.030, 0.93, 0.003, marks=pytest.mark.long),
-        ("opensim_core/walking5.c3d", 66.0, 0.030, 0.89, 0.005),
+        ("btkdata/FunctionalWalk.c3d", 60.5, 0.030, 0.87, 0.002, 0.06),
+        pytest.param(
+            "nimble_opencap_s4/walkingTO1.trc", 63.7, 0.030, 0.99, 0.002, 0.035, marks=pytest.mark.long
+        ),
+        pytest.param("opensim_core/walking2.c3d", 66.1, 0.030, 0.93, 0.003, 0.035, marks=pytest.mark.long),
+        ("opensim_core/walking5.c3d", 65.5, 0.030, 0.89, 0.005, 0.035),
     ],
 )
-def test_walks_agree_with_force_plates(script, recordings_folder, file, mass, cop, positive, shift):
+def test_walks_agree_with_force_plates(script, recordings_folder, file, mass, cop, positive, shift, vertical):
     found, supports, schedule, dynamics, measured = analysed(recordings_folder / "grf" / file)
     assert dynamics.body.mass == pytest.approx(mass, abs=0.5)
     margins = recorded_margins(dynamics, schedule, supports.start)
     shown = compare_with_plates(dynamics, margins, measured)
     assert shown is not None
     assert shown.single_frames > 40
-    # The bar of the vertical force is a tenth of the body's weight; what the plates felt, our stances admit.
-    assert shown.vertical_rms < 0.10
+    # What the plates felt, our stances admit.
+    assert shown.vertical_rms < vertical
     assert shown.margin_share > 0.99
     assert np.mean(margins.whole_body > 0.0) > positive
     nearest = least_shift(found, dynamics, margins)

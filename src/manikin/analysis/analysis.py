@@ -19,8 +19,10 @@ from manikin.ergonomics import Ergonomics
 from manikin.motion import Motion
 from manikin.numerics.spatial import GRAVITY, FloatArray
 from manikin.recordings.dynamics.plate_forces import (
+    ForceComparison,
     PlateComparison,
     TorqueComparison,
+    compare_foot_forces,
     compare_torques,
     compare_with_plates,
     plate_forces,
@@ -190,6 +192,8 @@ class PlateReport:
             was on a plate. ``shifted`` are those of it shifted onto its contacts, if a shift was looked for.
         torques: Of the legs, of the motion as recorded; empty where no foot was on a plate of its own.
             ``shifted_torques`` are those of the shifted motion, if that is to be believed.
+        foot_forces: Of each foot on a plate of its own, of the motion as recorded; ``shifted_foot_forces`` of
+            the shifted one, if that is to be believed.
         leg_loads: Torques by the plates, and which feet are on plates of their own.
         remarks: What was taken off the plates' readings, a line each.
     """
@@ -203,6 +207,8 @@ class PlateReport:
     shifted: PlateComparison | None
     torques: tuple[TorqueComparison, ...]
     shifted_torques: tuple[TorqueComparison, ...]
+    foot_forces: tuple[ForceComparison, ...]
+    shifted_foot_forces: tuple[ForceComparison, ...]
     leg_loads: LegLoads
     remarks: tuple[str, ...] = ()
 
@@ -222,6 +228,8 @@ class PlateReport:
             "single_support_frames": None if forces is None else forces.single_frames,
             "margin_share_positive": None if forces is None else forces.margin_share,
             "torques": _torques(self.torques), "torques_shifted": _torques(self.shifted_torques),
+            "foot_forces": _foot_forces(self.foot_forces),
+            "foot_forces_shifted": _foot_forces(self.shifted_foot_forces),
         }  # fmt: skip
 
 
@@ -232,6 +240,19 @@ def _torques(compared: Sequence[TorqueComparison]) -> dict[str, dict[str, float]
                     "peak_by_plates_Nm": one.peak_by_plates}
         for one in compared
     }  # fmt: skip
+
+
+def _foot_forces(compared: Sequence[ForceComparison]) -> dict[str, dict[str, float | None]]:
+    """JSON-ready, by component."""
+    return {
+        one.component.replace(" ", "_"): {
+            "frames": one.frames,
+            "rms": one.rms,
+            "rrmse": one.rrmse,
+            "r": one.r,
+        }
+        for one in compared
+    }
 
 
 def plate_report(
@@ -248,11 +269,12 @@ def plate_report(
     with np.errstate(divide="ignore", invalid="ignore"):
         cop = zero_moment_point(forces.wrench, height)
         cop = np.where((forces.wrench[:, 2] > 20.0)[:, None], cop, np.nan)
-    shifted, moved, moved_torques = measured.shifted, None, ()
+    shifted, moved, moved_torques, moved_feet = measured.shifted, None, (), ()
     if shifted is not None:
         moved = compare_with_plates(shifted.dynamics, shifted.margins, forces, height)
         if motions[1] is not None:
             moved_torques = compare_torques(shifted.dynamics, motions[1], forces)
+            moved_feet = compare_foot_forces(shifted.dynamics, motions[1], forces, height)
     loads = LegLoads(
         torques_of(measured.recorded, forces.effectors, forces.of_effector),
         dict(zip(forces.effectors, forces.alone.T, strict=True)),
@@ -260,7 +282,8 @@ def plate_report(
     return PlateReport(
         forces.wrench[:, 2], cop, forces.covered, mass, timing_errors(supports, plates),
         compare_with_plates(measured.recorded, measured.recorded_margins, forces, height), moved,
-        compare_torques(measured.recorded, motions[0], forces), moved_torques, loads,
+        compare_torques(measured.recorded, motions[0], forces), moved_torques,
+        compare_foot_forces(measured.recorded, motions[0], forces, height), moved_feet, loads,
     )  # fmt: skip
 
 

@@ -187,9 +187,9 @@ def analyze(
     where, enough = f"recording {recording.name!r}", f"valid: at least {FEWEST_FRAMES}"
     if len(recording) < FEWEST_FRAMES:
         raise InputError(f"{where} has {len(recording)} frame(s); {enough}")
-    if recording.rate <= 2.0 * CUTOFF:
+    if recording.rate <= 2.0 * CUTOFF.usual:
         wrong = f"has {recording.rate:g} frames per second"
-        raise InputError(f"{where} {wrong}; valid: more than {2.0 * CUTOFF:g}")
+        raise InputError(f"{where} {wrong}; valid: more than {2.0 * CUTOFF.usual:g}")
     start, plates, stated = 0.0, (), given.mass
     if isinstance(recording, MarkerRecording):
         recording = sides_exchanged(recording)

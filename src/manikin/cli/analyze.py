@@ -146,6 +146,9 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
             f"vertical {100.0 * plates['vertical_rms_body_weight']:.1f} % of body weight, "
             f"CoP {1e3 * plates['cop_rms_m']:.0f} mm (RMS)"
         )
+    if feet := plates["foot_forces"]:
+        apart = [f"{key} {100.0 * feet[key]['rms']:.1f} %" for key in ("up", "ahead", "aside") if key in feet]
+        shown["plates: force of a foot"] = f"{', '.join(apart)} of body weight (RMS)"
     if plates["torques"]:
         apart = [f"{key.replace('_', ' ')} {item['rms_Nm']:.0f}" for key, item in plates["torques"].items()]
         shown["plates: torques"] = f"{', '.join(apart)} N.m (RMS)"

@@ -18,8 +18,8 @@ from manikin.balance import zero_moment_point
 from manikin.body.segments import SIDES
 from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.motion import Motion
-from manikin.numerics.signals import low_passed
-from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
+from manikin.numerics.signals import low_passed, mask_runs
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, wrench_about
 from manikin.recordings.dynamics.recorded_dynamics import (
     RecordedDynamics,
     RecordedMargins,
@@ -291,3 +291,70 @@ def compare_torques(
             apart, peaks = mine - plates, (float(np.abs(each).max()) for each in (mine, plates))
             found.append(TorqueComparison(joint, len(mine), _rms(apart), float(apart.mean()), *peaks))
     return tuple(found)
+
+
+COMPONENTS = ("ahead", "aside", "up", "free moment")
+"""What is compared of the force of a foot: along its way, to the left of it, upwards, about the vertical."""
+
+LEAST_LOAD = 0.1
+"""Vertical force per body weight from which a foot has a free moment: below, its pressure is not known."""
+
+
+@dataclass(frozen=True)
+class ForceComparison:
+    """One component of the force of a foot, while it stands on a plate of its own.
+
+    Attributes:
+        component: One of :data:`COMPONENTS`; the free moment is that about the centre of pressure.
+        rms: Root mean square of the difference, per body weight [-]; of the free moment [m].
+        rrmse: ``rms`` over the mean of the ranges of both [-], as [Ren2008]_.
+        r: Correlation of the two; None where one of them does not vary.
+    """
+
+    component: str
+    frames: int
+    rms: float
+    rrmse: float
+    r: float | None
+
+
+def compare_foot_forces(
+    dynamics: RecordedDynamics, motion: Motion, measured: PlateForces, height: float = 0.0
+) -> tuple[ForceComparison, ...]:
+    """Compare the force of each foot with its plate's, of all stances together; none without any.
+
+    The motion is of :func:`manikin.recordings.dynamics.recorded_forces.motion_on_contacts`, the plates' top
+    is at a height [m]. The way is that of the centre of mass over the stance.
+    """
+    weight, pairs = GRAVITY * dynamics.body.mass, []
+    theirs = wrench_about(measured.of_effector, np.array([0.0, 0.0, height]))
+    for side in SIDES:
+        if (name := f"{side}_foot") not in motion.contact_names or name not in measured.effectors:
+            continue
+        mine, other = motion.contact_names.index(name), measured.effectors.index(name)
+        for first, stop in mask_runs(measured.alone[:, other] & motion.support[:, mine]):
+            way = (dynamics.com[stop - 1] - dynamics.com[first])[:2]
+            if (length := float(np.linalg.norm(way))) > 0.0:
+                ours = motion.contact_force[first:stop, mine]
+                pairs.append([_components(one, way / length) for one in (ours, theirs[first:stop, other])])
+    if not pairs:
+        return ()
+    ours, plates = (np.vstack(ones) / weight for ones in zip(*pairs, strict=True))
+    pressed = (ours[:, 2] > LEAST_LOAD) & (plates[:, 2] > LEAST_LOAD)
+    found = []
+    for number, component in enumerate(COMPONENTS):
+        rows = pressed if component == COMPONENTS[-1] else np.ones(len(ours), dtype=bool)
+        a, b = ours[rows, number], plates[rows, number]
+        if len(a) and (extent := 0.5 * float(np.ptp(a) + np.ptp(b))) > 0.0:
+            varies = min(float(np.std(a)), float(np.std(b))) > 0.0
+            r = float(np.corrcoef(a, b)[0, 1]) if varies else None
+            found.append(ForceComparison(component, len(a), _rms(a - b), _rms(a - b) / extent, r))
+    return tuple(found)
+
+
+def _components(wrench: FloatArray, way: FloatArray) -> FloatArray:
+    """(n, 4) components of wrenches (n, 6) about points of the ground, for a direction (2,) of length 1."""
+    (x, y, up), (mx, my, mz) = wrench[:, :3].T, wrench[:, 3:].T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        free = mz + (my * y + mx * x) / up
+    return np.stack([way[0] * x + way[1] * y, way[0] * y - way[1] * x, up, free], axis=1)

@@ -23,6 +23,7 @@ of two frames).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -58,7 +59,7 @@ from manikin.numerics.spatial import (
 )
 from manikin.recordings.reconstruction.proportions import Reconstruction
 from manikin.recordings.supports.body_supports import RecordedSupports
-from manikin.recordings.supports.support_levels import JOINTS
+from manikin.recordings.supports.support_levels import JOINTS, com_path
 
 MOTION_CUTOFF, FEWEST_FRAMES = 6.0, 4
 """Frequency above which a walk has little but noise [Hz] (Winter, Biomechanics and Motor Control, 2.2.4)."""
@@ -78,21 +79,22 @@ def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruc
 
 
 def smoothed_postures(
-    found: Reconstruction, cutoff: float = MOTION_CUTOFF, limits: bool = True,
+    found: Reconstruction, cutoff: "float | LocalCutoff" = MOTION_CUTOFF, limits: bool = True,
     touch_downs: Sequence[float] = (),
 ) -> FloatArray:  # fmt: skip
     """(n, nq) postures of :func:`smoothed`, without their residuals.
 
-    Hinges may go beyond their limits: the kink where an angle meets its limit spoils second derivatives. At
-    touch-downs, on the clock of ``found`` [s], the cutoff rises; without any it is the Butterworth filter's.
+    Hinges may go beyond their limits: the kink where an angle meets its limit spoils second derivatives. A
+    :class:`LocalCutoff` rises at touch-downs, on the clock of ``found`` [s]; without any, and for a number,
+    it is the Butterworth filter's.
     """
-    rate = _rate(found)
-    finite_number(cutoff, "cutoff [Hz]", above=0.0)
-    if cutoff >= 0.5 * rate:
-        raise InputError(f"cutoff is {cutoff:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
+    rate, local = _rate(found), cutoff if isinstance(cutoff, LocalCutoff) else LocalCutoff(cutoff, cutoff)
+    finite_number(local.usual, "cutoff [Hz]", above=0.0)
+    if local.usual >= 0.5 * rate:
+        raise InputError(f"cutoff is {local.usual:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
     q = align_quaternions(found.q)
-    ceiling = np.minimum(local_cutoff(found.time, touch_downs, cutoff), HIGHEST_SHARE * rate)
-    q = smooth(q, rate, ceiling) if len(touch_downs) else low_passed(q, cutoff, rate)
+    varies = len(touch_downs) and local.highest > local.usual
+    q = smooth(q, rate, local.at(found.time, touch_downs)) if varies else low_passed(q, local.usual, rate)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     if limits:
         q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
@@ -135,25 +137,38 @@ def _rate(found: Reconstruction) -> float:
     return found.rate
 
 
-TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH, HIGHEST_SHARE = 8.0, 0.08, 0.45
-"""Cutoff at a touch-down [Hz], time from it in which the cutoff falls to 1/e of its rise [s], and highest
-cutoff there per rate of the recording: faster motion aliases."""
+@dataclass(frozen=True)
+class LocalCutoff:
+    """A cutoff that is higher about touch-downs.
+
+    Attributes:
+        usual: Far from touch-downs [Hz]; ``highest`` at one [Hz].
+        width: Time from a touch-down in which it falls to 1/e of its rise [s].
+    """
+
+    usual: float
+    highest: float
+    width: float = 0.08
+
+    def at(self, time: FloatArray, touch_downs: Sequence[float]) -> FloatArray:
+        """(n,) at instants (n,) [s]: a bell over each touch-down, the highest [Hz]."""
+        found, rise = np.full(len(time), self.usual), self.highest - self.usual
+        for instant in touch_downs:
+            found = np.maximum(found, self.usual + rise * np.exp(-(((time - instant) / self.width) ** 2)))
+        return found
 
 
-def local_cutoff(time: FloatArray, touch_downs: Sequence[float], cutoff: float) -> FloatArray:
-    """(n,) cutoff at instants (n,) [s]: the one given, and a bell over each touch-down, the highest [Hz]."""
-    found, rise = np.full(len(time), cutoff), TOUCH_DOWN_CUTOFF - cutoff
-    for instant in touch_downs:
-        found = np.maximum(found, cutoff + rise * np.exp(-(((time - instant) / TOUCH_DOWN_WIDTH) ** 2)))
-    return found
+HIGHEST_SHARE = 0.45
+"""Highest cutoff per rate of the recording: faster motion aliases."""
 
 
 def smooth(values: FloatArray, rate: float, cutoff: FloatArray) -> FloatArray:
     """(n, k) columns low-passed with a cutoff (n,) below half the rate for each instant [Hz].
 
-    The amplitude is halved at the cutoff. Both ends are continued as point reflections, so that a straight
-    line stays as it is. There are at least two instants at an even rate.
+    The amplitude is halved at the cutoff, of at most :data:`HIGHEST_SHARE`. Both ends are continued as point
+    reflections, so that a straight line stays as it is. There are at least two instants at an even rate.
     """
+    cutoff = np.minimum(cutoff, HIGHEST_SHARE * rate)
     pad = min(len(values) - 1, int(np.ceil(2.0 * rate / float(cutoff.min()))))
     first, last = 2.0 * values[0] - values[pad:0:-1], 2.0 * values[-1] - values[-2 : -pad - 2 : -1]
     known = np.vstack([first, values, last])
@@ -169,9 +184,13 @@ def smooth(values: FloatArray, rate: float, cutoff: FloatArray) -> FloatArray:
     return smoothed[pad : pad + len(values)]
 
 
-CUTOFF = 5.0
-"""Low-pass of postures that are differentiated twice, as [Qiu2012]_ 3.2.1, one for all recordings [Hz]. With
-4 Hz touch-downs reach too far, with 6 Hz and more the noise of the trunk takes over."""
+CUTOFF = LocalCutoff(5.0, 8.0)
+"""Low-pass of postures that are differentiated twice, as [Qiu2012]_ 3.2.1, one for all recordings. With 4 Hz
+touch-downs reach too far, with 6 Hz and more the noise of the trunk takes over."""
+
+HEIGHT_CUTOFF = LocalCutoff(5.0, 7.0, 0.3)
+"""Low-pass of the height of the centre of mass, which the noise of single joints reaches less: between the
+touch-downs of a walk the vertical force has more above 5 Hz than its noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +251,7 @@ class RecordedDynamics:
 
 
 def dynamics_of(
-    found: Reconstruction, cutoff: float = CUTOFF, touch_downs: Sequence[float] = ()
+    found: Reconstruction, cutoff: float | None = None, touch_downs: Sequence[float] = ()
 ) -> RecordedDynamics:
     """Smooth a reconstruction, differentiate it twice and find the wrench that it needs.
 
@@ -240,16 +259,29 @@ def dynamics_of(
 
     Args:
         found: At least four instants at an even rate, not yet smoothed.
-        cutoff: Of the low-pass of the postures [Hz].
-        touch_downs: Instants at which it rises for a moment, see :func:`touch_downs_of` [s].
+        cutoff: Of the low-pass of the postures [Hz]; those of :data:`CUTOFF` when omitted, with the centre of
+            mass at its own height of :data:`HEIGHT_CUTOFF`.
+        touch_downs: Instants at which these rise for a moment, see :func:`touch_downs_of` [s].
     """
-    q = smoothed_postures(found, cutoff, limits=False, touch_downs=touch_downs)
+    if cutoff is not None:
+        return dynamics_of_postures(found, smoothed_postures(found, cutoff, limits=False))
+    q = smoothed_postures(found, CUTOFF, limits=False, touch_downs=touch_downs)
+    height = com_path(found.body, align_quaternions(found.q))[:, 2:]
+    wanted = smooth(height, found.rate, HEIGHT_CUTOFF.at(found.time, touch_downs))
+    q[:, 2:3] += wanted - com_path(found.body, q)[:, 2:]
     return dynamics_of_postures(found, q)
 
 
 def touch_downs_of(supports: RecordedSupports) -> tuple[float, ...]:
-    """Instants at which a support begins, on the clock of the reconstruction [s]."""
-    return tuple(one.start - supports.start for one in supports.supports if one.start_seen)
+    """Instants at which a support begins beside another one, on the clock of the reconstruction [s].
+
+    Who lands from a flight swings through a whole period of the low-pass in one support: a cutoff that rises
+    there adds the wobble of the markers at the impact.
+    """
+    beside = {phase.start for before, phase in pairwise(supports.phases) if before.effectors}
+    return tuple(
+        one.start - supports.start for one in supports.supports if one.start_seen and one.start in beside
+    )
 
 
 def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynamics:

@@ -19,6 +19,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,19 +93,26 @@ class Support:
 
     def frames(self, start: float, rate: float, count: int) -> tuple[int, int]:
         """First frame and the one after the last, of ``count`` at a rate [Hz] from an instant on [s]."""
-        first, stop = (round((instant - start) * rate) for instant in (self.start, self.end))
+        first, stop = (ceil((instant - start) * rate - _SAME) for instant in (self.start, self.end))
         return first, stop if self.end_seen else count
 
 
 Places = tuple[FloatArray, FloatArray, FloatArray]
 
+_SAME = 1e-6
+"""Share of a frame within which an instant is that of a frame."""
+
 
 def support_in(
     effector: str, frames: tuple[int, int], count: int, rate: float, start: float, places: Places
 ) -> Support:
-    """Support for a run of ``count`` frames at a rate [Hz] from an instant on [s], with its three places."""
+    """Support for a run of ``count`` frames at a rate [Hz] from an instant on [s], with its three places.
+
+    It begins and ends half-way between a frame in which it is seen and one in which it is not.
+    """
     first, stop = frames
-    instants = start + first / rate, start + min(stop, count - 1) / rate
+    begin, end = first - 0.5 if first > 0 else 0.0, stop - 0.5 if stop < count else count - 1.0
+    instants = start + begin / rate, start + end / rate
     return Support(effector, *instants, *places, first > 0, stop < count)
 
 

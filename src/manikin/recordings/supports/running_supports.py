@@ -39,8 +39,7 @@ def while_carried(supports: Sequence[Support], found: Reconstruction, start: flo
     """Those supports in which the centre of mass does not fall freely; frames begin at ``start`` [s]."""
     falls = -vertical_acceleration(found, SUPPORT_LEVELS_CUTOFF) / GRAVITY
     for one in supports:
-        first, last = (round((instant - start) * found.rate) for instant in (one.start, one.end))
-        if float(np.median(falls[first : last + 1])) < FREE:
+        if float(np.median(falls[slice(*one.frames(start, found.rate, len(falls)))])) < FREE:
             yield one
 
 
