@@ -97,7 +97,8 @@ def sources(table: Path) -> dict[str, tuple[str, str]]:
 
 def page(trials: list[Trial], known: Mapping[str, tuple[str, str]], code: str) -> str:
     """The whole page."""
-    parts = [TEXT.format(code=code), summary(trials), by_source(trials), OFF, every(trials), THANKS]
+    parts = [TEXT.format(code=code), summary(trials), feet(trials), by_source(trials)]
+    parts += [OFF, every(trials), THANKS]
     used = sorted({folder_of(one) for one in trials})
     lines = ["| folder | source | terms |", "|---|---|---|"]
     lines += [row(folder, *known.get(folder, ("", ""))) for folder in used]
@@ -144,6 +145,45 @@ def summary(trials: list[Trial]) -> str:
             shown = (f"{factor * np.quantile(values, share):.1f} {unit}" for share in (0.5, 0.9))
             lines.append(row(name, *shown, str(len(values)), kept))
     return told + "\n".join(lines) + "\n\n"
+
+
+PUBLISHED = {"up": (0.992, 5.3), "ahead": (0.965, 9.4), "aside": (0.862, 13.1), "free_moment": (0.826, None)}
+"""Correlation and relative error in percent of forces from inertial sensors (Karatsidis 2017)."""
+
+FEET = """## The force of a foot
+
+Walks over the ground, each foot on a plate of its own, whole stances: root mean square of the difference per
+body weight (of the free moment about the centre of pressure: per body weight and metre), over the mean of the
+ranges of both, and correlation; medians over {count} trials, with the 10th or 90th percentile on the worse side.
+In double support the shares of the feet are not measured but assumed. Published, from 17 inertial sensors
+at a comfortable speed: [Karatsidis 2017](references.md#methods).
+
+| component | as recorded: RMS | relative | r | shifted: RMS | relative | r | published: relative | r |
+|---|---|---|---|---|---|---|---|---|
+"""
+
+
+def feet(trials: list[Trial]) -> str:
+    """Errors of the force of one foot, beside published ones."""
+    walks = [
+        one for one in trials
+        if one.get("activity") == "walking" and plates_of(one).get("foot_forces")
+        and not any("treadmill" in remark for remark in one["remarks"])
+    ]  # fmt: skip
+    lines = []
+    for component, (r, relative) in PUBLISHED.items():
+        cells = []
+        for key in ("foot_forces", "foot_forces_shifted"):
+            known = [found for one in walks if (found := (plates_of(one)[key] or {}).get(component))]
+            for name, share in (("rms", 0.9), ("rrmse", 0.9), ("r", 0.1)):
+                values = [one[name] for one in known if one[name] is not None]
+                factor, unit = (1.0, "") if name == "r" else (100.0, " %")
+                digits = 2 if name == "r" else 1
+                shown = (f"{factor * np.quantile(values, q):.{digits}f}{unit}" for q in (0.5, share))
+                cells.append(", ".join(shown))
+        theirs = "-" if relative is None else f"{relative:g} %"
+        lines.append(row(component.replace("_", " "), *cells, theirs, f"{r:g}"))
+    return FEET.format(count=len(walks)) + "\n".join(lines) + "\n\n"
 
 
 def values_of(trials: Iterable[Trial], key: str) -> list[float]:

@@ -16,6 +16,7 @@ from manikin.numerics.spatial import wrench_about
 from manikin.recordings.dynamics.plate_forces import compare_torques, plate_forces
 from manikin.recordings.dynamics.recorded_dynamics import dynamics_of
 from manikin.recordings.dynamics.recorded_forces import (
+    AIM,
     LEVER,
     SLOW,
     contact_wrenches,
@@ -43,11 +44,16 @@ def pushed(frames, place, force=(50.0, 0.0, 700.0)):
     return wrench_about(np.tile(np.r_[force, np.zeros(3)], (frames, 1)), -np.asarray(place, dtype=float))
 
 
+def above(frames):
+    """(n, 3) where forces meet: 1.2 m above the middle of the two steps."""
+    return np.tile(0.5 * (PLACES[0] + PLACES[1]) + [0.0, 0.0, 1.2], (frames, 1))
+
+
 def test_a_contact_is_loaded_from_nothing_to_all():
     """A constant force over the middle of two steps goes from one foot to the other, half of it half-way."""
     held = steps()
     middle = 0.5 * (PLACES[0] + PLACES[1])
-    shares = smooth_shares(pushed(60, middle), held, np.tile(PLACES[:2], (60, 1, 1)), STEP)
+    shares = smooth_shares(pushed(60, middle), held, np.tile(PLACES[:2], (60, 1, 1)), above(60), STEP)
     load = shares[:, 1, 2] / 700.0
     assert not load[:20].any()
     np.testing.assert_allclose(load[40:], 1.0)
@@ -60,16 +66,33 @@ def test_a_contact_is_loaded_from_nothing_to_all():
     np.testing.assert_allclose(load[20:40], wanted, atol=0.02)
 
 
+def test_forces_of_two_feet_meet_above_the_centre_of_mass():
+    """Of 700 N on two feet 0.6 m apart each points inwards, and upright were only sizes to count."""
+    held, middle = np.ones((200, 2), dtype=bool), 0.5 * (PLACES[0] + PLACES[1])
+    shares = smooth_shares(
+        pushed(200, middle, (0.0, 0.0, 700.0)), held, np.tile(PLACES[:2], (200, 1, 1)), above(200), STEP
+    )
+    rear, front = shares[100]
+    np.testing.assert_allclose(rear + front, pushed(1, middle, (0.0, 0.0, 700.0))[0], atol=1e-6)
+    about = [wrench_about(one, above(1)[0]) for one in (rear, front)]
+    upright = 350.0 * 0.5 * np.linalg.norm(PLACES[1] - PLACES[0])
+    assert max(np.linalg.norm(one[3:]) for one in about) < 0.1 * upright
+    assert rear[0] > 0.5 * 350.0 * 0.3 / 1.2
+
+
 def test_feet_push_against_each_other_between_pushing_off_and_braking():
-    """The force ahead before, 100 N, and the one after, -100 N, fade into each other."""
-    held, ahead = steps(), np.interp(np.arange(60), [19, 40], [100.0, -100.0])
-    middle = 0.5 * (PLACES[0] + PLACES[1])
-    wrench = np.array([pushed(1, middle, (force, 0.0, 700.0))[0] for force in ahead])
-    shares = smooth_shares(wrench, held, np.tile(PLACES[:2], (60, 1, 1)), STEP)
+    """The pressure goes from one foot to the other, and the force always points to where forces meet."""
+    held, share = steps(), np.interp(np.arange(60), [19, 40], [0.0, 1.0])[:, None]
+    under = (1.0 - share) * PLACES[0] + share * PLACES[1]
+    wrench = np.array([
+        pushed(1, place, 700.0 / 1.2 * (point - place))[0]
+        for place, point in zip(under, above(60), strict=True)
+    ])  # fmt: skip
+    shares = smooth_shares(wrench, held, np.tile(PLACES[:2], (60, 1, 1)), above(60), STEP)
     behind, front = shares[29:31, :, 0].T
-    assert (behind > 20.0).all()
-    assert (front < -20.0).all()
-    np.testing.assert_allclose(behind + front, ahead[29:31], atol=1e-9)
+    # Half of the weight on each, inclined as the line from the foot to the point: 87 N.
+    np.testing.assert_allclose(behind, 350.0 * 0.3 / 1.2, rtol=0.25)
+    np.testing.assert_allclose(behind + front, wrench[29:31, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize("alone", [0, 1, 4])
@@ -78,20 +101,21 @@ def test_who_lands_nearly_at_once_stands_on_both_feet(alone):
     held = np.zeros((80, 2), dtype=bool)
     held[20:, 0] = held[20 + alone :, 1] = True
     shares = smooth_shares(
-        pushed(80, 0.5 * (PLACES[0] + PLACES[1])), held, np.tile(PLACES[:2], (80, 1, 1)), STEP
+        pushed(80, 0.5 * (PLACES[0] + PLACES[1])), held, np.tile(PLACES[:2], (80, 1, 1)), above(80), STEP
     )
     np.testing.assert_allclose(shares[20 + alone + 2 :, :, 2], 350.0, atol=1.0)
 
 
 @given(seed=st.integers(0, 2**16))
 def test_shares_add_up_and_none_changes_less(seed):
-    """Whatever is passed from one contact to another makes the sum of changes and sizes larger."""
+    """Whatever is passed from one contact to another makes changes, sizes and moments larger in sum."""
     rng = np.random.default_rng(seed)
     frames = 36
     held = rng.uniform(size=(frames // 6, 3)).repeat(6, axis=0) > 0.4  # longer than ALONE
     points = np.tile(PLACES + rng.normal(scale=0.1, size=(3, 3)), (frames, 1, 1))
     wrench = np.cumsum(rng.normal(scale=40.0, size=(frames, 6)), axis=0)
-    shares = smooth_shares(wrench, held, points, STEP)
+    meeting = above(frames) + rng.normal(scale=0.1, size=(frames, 3))
+    shares = smooth_shares(wrench, held, points, meeting, STEP)
     supported = held.any(axis=1)
     np.testing.assert_allclose(shares.sum(axis=1)[supported], wrench[supported], atol=1e-6)
     assert not shares[~held].any()
@@ -101,7 +125,9 @@ def test_shares_add_up_and_none_changes_less(seed):
         own[..., 3:] /= LEVER
         own[~held] = 0.0
         changes = np.diff(own, axis=0)
-        return float(np.sum(changes**2) + (STEP / SLOW) ** 2 * np.sum(own**2))
+        moments = wrench_about(np.where(held[..., None], given, 0.0), meeting[:, None])[..., 3:]
+        aside = (STEP / AIM) ** 2 * np.sum(moments**2)
+        return float(np.sum(changes**2) + (STEP / SLOW) ** 2 * np.sum(own**2) + aside)
 
     several = np.flatnonzero(held.sum(axis=1) > 1)
     for frame in several[:5]:

@@ -4,13 +4,14 @@ A single contact supplies the whole wrench that the motion needs. Several contac
 People load a foot gradually from its touch-down and unload it until its lift-off; of all shares that add up
 to the wrench in every frame, those are chosen whose wrenches ``f_i`` at the contacts minimise
 
-    ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 dt``,
+    ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 + |m_i|^2 / A^2 dt``,
 
-with ``f_i = 0`` before the contact is made and after it is left. What one foot supplies alone before and
-after a double support continues into it, so that the rear foot pushes ahead while the front one brakes, as
-measured under people who walk; least forces would not have the feet push against each other at all. The idea
-is that of Ren, Jones and Howard ("Whole body inverse dynamics over a complete gait cycle based only on
-measured kinematics", J. Biomech. 41, 2008), for contacts of any number and kind.
+with ``f_i = 0`` before the contact is made and after it is left, and ``m_i`` the moment of the contact about a
+point above the centre of mass: forces on people who walk or run meet there (Maus et al., "Upright human gait
+did not provide a major mechanical challenge for our ancestors", Nature Comm. 1, 2010). So the rear foot pushes
+ahead while the front one brakes; least forces would not have the feet push against each other at all. That a
+foot goes on with what it supplies alone before and after is the idea of [Ren2008]_, for contacts of any number
+and kind.
 
 Shares that the contacts can give stay as they are. Others become pushes within the friction pyramids: with
 ``G`` the wrenches of unit pushes at the corners, one a column, and ``l`` the pushes of each contact that come
@@ -47,12 +48,18 @@ SLOW = 0.2
 """``T`` [s]: a double support of walking is short beside it, standing is long. Force plates under people who
 walk would have it longer, under one who stands after a step shorter."""
 
+AIM, ABOVE = 0.015, 0.2
+"""``A`` [m.s], and height above the centre of mass of the point where forces meet [m]: with half and twice of
+``A``, and on the centre of mass, forces ahead under people who walk are as near to those of plates."""
+
 ALONE = 0.05
 """Time for which a contact has to carry alone to define its load in an adjoining support of several [s]:
 instants of supports are known to some hundredths of a second."""
 
 
-def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float) -> FloatArray:
+def smooth_shares(
+    wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, meeting: FloatArray, step: float
+) -> FloatArray:
     """(n, c, 6) shares of smoothly loaded contacts, about the world's origin; friction is not regarded.
 
     Their sum over the contacts is the wrench where any is made; they are 0 elsewhere.
@@ -61,10 +68,11 @@ def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArra
         wrench: (n, 6) to be supplied, about the world's origin [N, N.m], every ``step`` [s].
         held: (n, c) which contacts are made.
         points: (n, c, 3) where they are [m]; any value where they are not made.
+        meeting: (n, 3) points that their forces rather pass [m].
     """
     found = np.where(held[..., None], wrench[:, None], 0.0)
     for first, end in mask_runs(held.sum(axis=1) > 1):
-        found[first:end] = _smooth_run(found, held, points, step, first, end)
+        found[first:end] = _smooth_run(found, held, points, meeting, step, first, end)
     return found
 
 
@@ -121,12 +129,13 @@ def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray
 
 
 def _smooth_run(
-    found: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float, first: int, end: int
-) -> FloatArray:
+    found: FloatArray, held: NDArray[np.bool_], points: FloatArray, meeting: FloatArray, step: float,
+    first: int, end: int,
+) -> FloatArray:  # fmt: skip
     """(k, c, 6) smooth shares in the frames from ``first`` up to ``end``, all with several contacts.
 
-    The wrenches about their own points, moments per lever, are the unknowns: their changes and sizes are
-    least squares, with one linear equation for the sum in every frame.
+    The wrenches about their own points, moments per lever, are the unknowns: their changes, their sizes and
+    their moments about where they meet are least squares, with one linear equation for the sum in every frame.
     """
     made = held[first:end]
     places = np.where(made[..., None], points[first:end], 0.0)
@@ -153,7 +162,10 @@ def _smooth_run(
     total = _about(found[first:end][frame, contact], middle[frame])  # the whole wrench, once per contact
     begins = np.searchsorted(frame, np.arange(end - first))
     sums = _sums(frame, places[frame, contact] - middle[frame], end - first)
-    system = sparse.block_array([[sparse.kron(cost, np.eye(6)), sums.T], [sums, None]])
+    moments = wrench_map(meeting[first:end][frame] - places[frame, contact])[:, 3:] * (step / AIM)
+    moments[..., 3:] *= LEVER
+    sizes = sparse.block_diag(list(moments.swapaxes(1, 2) @ moments), format="csr")
+    system = sparse.block_array([[sparse.kron(cost, np.eye(6)) + sizes, sums.T], [sums, None]])
     right = np.concatenate([(change.T @ known).ravel(), total[begins].ravel()])
     solved = splu(sparse.csc_matrix(system)).solve(right)[: 6 * count].reshape(count, 6)
     solved[:, 3:] *= LEVER
@@ -246,7 +258,8 @@ def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, star
     phases, held = schedule.phase_at(times), schedule.support(times, names)
     points = _points(schedule, phases)
     step, weight = float(dynamics.time[1] - dynamics.time[0]), GRAVITY * dynamics.body.mass
-    wrenches = smooth_shares(dynamics.wrench, held, points, step)
+    meeting = dynamics.com + np.array([0.0, 0.0, ABOVE])
+    wrenches = smooth_shares(dynamics.wrench, held, points, meeting, step)
     for number, phase in enumerate(schedule.sequence):
         frames, stance = np.flatnonzero(phases == number), phase.stance
         if len(frames) and len(stance) > 1:
