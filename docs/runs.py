@@ -96,8 +96,9 @@ supports, four low-passes of the postures; *recorded* and *shifted* are shares o
 """
 LEFT = """
 At 120 frames per second higher cutoffs take force out of flights, most of it at 8 Hz, at 30 they add some;
-at both fewer frames are in balance as recorded, and none more once shifted. So the rule of walks stays:
-5 Hz, and 8 Hz at touch-downs.
+at both fewer frames are in balance as recorded, and none more once shifted. A cutoff that rises at landings
+from flights, as it does at those of walks, leaves fewer frames in balance, too. So runs have 5 Hz: beside
+plates their vertical forces are nearer with it as well ([laboratories](laboratories.md#what-is-off)).
 
 ## What is not known
 

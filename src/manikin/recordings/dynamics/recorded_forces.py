@@ -6,12 +6,12 @@ to the wrench in every frame, those are chosen whose wrenches ``f_i`` at the con
 
     ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 + |m_i|^2 / A^2 dt``,
 
-with ``f_i = 0`` before the contact is made and after it is left, and ``m_i`` the moment of the contact about a
-point above the centre of mass: forces on people who walk or run meet there (Maus et al., "Upright human gait
-did not provide a major mechanical challenge for our ancestors", Nature Comm. 1, 2010). So the rear foot pushes
-ahead while the front one brakes; least forces would not have the feet push against each other at all. That a
-foot goes on with what it supplies alone before and after is the idea of [Ren2008]_, for contacts of any number
-and kind.
+with ``f_i = 0`` before the contact is made and after it is left, and ``m_i`` the moment of the contact about
+a point above the centre of mass: forces on people who walk or run meet there (Maus et al., "Upright human
+gait did not provide a major mechanical challenge for our ancestors", Nature Comm. 1, 2010). So the rear foot
+pushes ahead while the front one brakes; least forces would not have the feet push against each other at all.
+That a foot goes on with what it supplies alone before and after is the idea of [Ren2008]_, for contacts of
+any number and kind.
 
 Shares that the contacts can give stay as they are. Others become pushes within the friction pyramids: with
 ``G`` the wrenches of unit pushes at the corners, one a column, and ``l`` the pushes of each contact that come
@@ -135,7 +135,7 @@ def _smooth_run(
     """(k, c, 6) smooth shares in the frames from ``first`` up to ``end``, all with several contacts.
 
     The wrenches about their own points, moments per lever, are the unknowns: their changes, their sizes and
-    their moments about where they meet are least squares, with one linear equation for the sum in every frame.
+    their moments about where they meet are least squares, with one linear equation for the sum in each frame.
     """
     made = held[first:end]
     places = np.where(made[..., None], points[first:end], 0.0)
