@@ -61,6 +61,7 @@ FAR = 20.0  # estimate of the cost from which on the first factor is left out [s
 SAME_GREED = 3  # ways after which the search for another one begins with the factor that found the last
 ALIKE = 0.08  # distance of footholds up to which a step is much like one that was refused [m]; our choice
 SAME_WAY, SAME_TURN, SAME_SLOPE = 0.04, 0.25, 0.1  # up to which steps are as hard [m, rad, 1]; our choice
+OVERHANG_COST = 6.0  # cost of a sole that hangs over, by the share of it that does [s]: more than a step
 TURN_COST = 0.9  # cost of a turn [s/rad]: two steps turn a body by a right angle
 TURN_WAY = 0.6  # way on which going backwards costs as much as a turn by two radians [m]
 LOOK = 5  # cells of the way that tell where it leads
@@ -278,7 +279,7 @@ class FootstepSearch:
         made &= rectangles_apart(ahead, aside, turned, self._footholds.size) >= SOLES_APART
         cost = STEP * (1.0 + (way / (EASY * self._stride * size)) ** 4)
         steep = 8.0 * np.maximum(0.0, rise - 0.2 * size)
-        cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + 3.0 * (1.0 - shares)
+        cost += 1.2 * rise + steep + 0.25 * np.abs(turned) + OVERHANG_COST * (1.0 - shares)
         cost += 0.6 * np.maximum(0.0, -ahead) + 0.8 * np.maximum(0.0, aside - 0.26 * size)
         cost += 1.5 * np.maximum(0.0, 0.15 * size - aside) + np.maximum(0.0, -0.3 - turned)
         flat = made & (rise < FLAT * size)
