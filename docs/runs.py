@@ -97,8 +97,8 @@ supports, four low-passes of the postures; *recorded* and *shifted* are shares o
 LEFT = """
 At 120 frames per second higher cutoffs take force out of flights, most of it at 8 Hz, at 30 they add some;
 at both fewer frames are in balance as recorded, and none more once shifted. A cutoff that rises at landings
-from flights, as it does at those of walks, leaves fewer frames in balance, too. So runs have 5 Hz: beside
-plates their vertical forces are nearer with it as well ([laboratories](laboratories.md#what-is-off)).
+from flights, as it does at those of walks, takes a little force out of flights at 120 frames per second and
+leaves fewer frames in balance at both rates. So runs have 5 Hz.
 
 ## What is not known
 
@@ -194,8 +194,8 @@ def strides_of(found: Reconstruction, supports: RecordedSupports) -> list[float]
     """Mean vertical force per weight between touch-downs of the same foot."""
     force, means = force_of(found), []
     for name in ("left_foot", "right_foot"):
-        downs = [one.start - supports.start for one in supports.of(name) if one.start_seen]
-        frames = [round(instant * found.rate) for instant in downs if instant > AT_END]
+        seen = [one for one in supports.of(name) if one.start_seen and one.start > supports.start + AT_END]
+        frames = [one.frames(supports.start, found.rate, len(force))[0] for one in seen]
         means += [float(np.mean(force[a:b])) for a, b in pairwise(frames)]
     return means
 
@@ -302,7 +302,8 @@ def by_recording(runs: Sequence[Run]) -> str:
 
 def by_cutoff(runs: Sequence[Run]) -> str:
     """One row for each low-pass and rate."""
-    names = ("5 Hz, more at touch-downs of walks (used)", "and at those from flights", "8 Hz", "10 Hz")
+    used = "5 Hz, more for the height of the CoM and at touch-downs of walks (used)"
+    names = (used, "and at landings from flights", "8 Hz", "10 Hz")
     rows = []
     for name, number in zip(names, range(len(names)), strict=True):
         for rate in (120, 30):

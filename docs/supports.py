@@ -97,7 +97,7 @@ alone (`supports_of`). By `docs/supports.py`.
 * Positions of effectors of the reconstructed body, low-passed at 5 Hz (Butterworth, second order, forward
   and backward), and their speeds. A switch with hysteresis closes where a point is slow, below 10 % of the
   highest speed of its swing or 0.12 m/s, and opens above 20 %, the shares with the
-  least errors against plates of [25 laboratories](laboratories.md).
+  least errors against plates of [other laboratories](laboratories.md).
 * **Feet**: heel and toes, and the ball of a foot with a raised heel, each on one of the *surfaces*: heights
   at which a sole rests while another foot moves, one where they differ by less than 8 cm or go over into each
   other without a gap of 3 cm. A foot of which even the

@@ -67,7 +67,7 @@ def test_a_contact_is_loaded_from_nothing_to_all():
 
 
 def test_forces_of_two_feet_meet_above_the_centre_of_mass():
-    """Of 700 N on two feet 0.6 m apart each points inwards, and upright were only sizes to count."""
+    """Of 700 N on two feet 0.6 m apart each points inwards; the least forces would be upright."""
     held, middle = np.ones((200, 2), dtype=bool), 0.5 * (PLACES[0] + PLACES[1])
     shares = smooth_shares(
         pushed(200, middle, (0.0, 0.0, 700.0)), held, np.tile(PLACES[:2], (200, 1, 1)), above(200), STEP

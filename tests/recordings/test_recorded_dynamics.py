@@ -249,8 +249,8 @@ def test_the_force_of_a_foot_is_compared_by_components(swinging, dynamics):
     alone = on_feet(swinging).sequence[0].stance["left_foot"]
     schedule = ContactSchedule(StanceSequence([Phase(Stance([alone], 3200.0), 3.0)]), [0.0, 3.0])
     motion = motion_on_contacts(dynamics, schedule)
+    dynamics = replace(dynamics, com=dynamics.com + np.outer(TIME, [0.5, 0.2, 0.0]))
     way = dynamics.com[-1, :2] - dynamics.com[0, :2]
-    assert np.linalg.norm(way) > 1e-6
     ahead = np.array([*(20.0 * way / np.linalg.norm(way)), 0.0, 0.0, 0.0, 0.0])
     weight = GRAVITY * dynamics.body.mass
     for more, component, apart in (
@@ -266,6 +266,31 @@ def test_the_force_of_a_foot_is_compared_by_components(swinging, dynamics):
         others = [one.rms for name, one in found.items() if name not in (component, "free moment")]
         assert max(others) < 1e-4
     assert compare_foot_forces(dynamics, motion, plate_forces([plate], TIME, on_feet(swinging))) == ()
+
+
+def test_forces_of_both_feet_are_outwards(swinging, dynamics):
+    """Plates feel 5 N more outwards. Both feet push inwards alike, which is no range of their forces."""
+    motion, half = motion_on_contacts(dynamics, on_feet(swinging)), np.array([1.0, 1.0, 0.0])
+    plates = [
+        ForcePlate(
+            side, wrenches, np.zeros(3), RATE,
+            corners=SQUARE * half + np.array([0.0, 1.0 if side == "left" else -1.0, 0.0]),
+        )
+        for side, wrenches in zip(
+            ("left", "right"), contact_wrenches(dynamics, on_feet(swinging)).swapaxes(0, 1), strict=True
+        )
+    ]  # fmt: skip
+    plates[0] = replace(plates[0], wrenches=plates[0].wrenches + np.eye(6)[1] * 5.0)
+    plates[1] = replace(plates[1], wrenches=plates[1].wrenches - np.eye(6)[1] * 5.0)
+    way = dynamics.com[-1] - dynamics.com[0]
+    still = replace(dynamics, com=dynamics.com + np.outer(TIME, [1.0, 0.0, 0.0]) - np.outer(TIME, way / 3.0))
+    measured = plate_forces(plates, TIME, on_feet(swinging), cutoff=40.0)
+    found = {one.component: one for one in compare_foot_forces(still, motion, measured)}
+    assert found["aside"].frames == 2 * FRAMES
+    assert found["aside"].rms == pytest.approx(5.0 / (GRAVITY * dynamics.body.mass), rel=1e-2)
+    apart = np.ptp(motion.contact_force[150, :, 1])
+    assert found["aside"].rms / found["aside"].rrmse < 0.5 * apart / (GRAVITY * dynamics.body.mass)
+    assert compare_foot_forces(replace(dynamics, com=np.zeros_like(dynamics.com)), motion, measured) == ()
 
 
 def test_a_foot_beside_the_plate_is_not_covered(swinging, dynamics):

@@ -294,15 +294,17 @@ def compare_torques(
 
 
 COMPONENTS = ("ahead", "aside", "up", "free moment")
-"""What is compared of the force of a foot: along its way, to the left of it, upwards, about the vertical."""
+"""What is compared of the force of a foot: along the way, to the foot's outer side, upwards, and about the
+vertical, positive where it turns the toes outwards. So both feet have the same signs."""
 
-LEAST_LOAD = 0.1
-"""Vertical force per body weight from which a foot has a free moment: below, its pressure is not known."""
+LEAST_LOAD, LEAST_WAY = 0.1, 0.1
+"""Vertical force per body weight from which a foot has a free moment: below, its pressure is not known. Way
+of the centre of mass along the ground from which a stance has a direction [m]."""
 
 
 @dataclass(frozen=True)
 class ForceComparison:
-    """One component of the force of a foot, while it stands on a plate of its own.
+    """One component of the forces of feet, while they stand on plates of their own.
 
     Attributes:
         component: One of :data:`COMPONENTS`; the free moment is that about the centre of pressure.
@@ -323,20 +325,21 @@ def compare_foot_forces(
 ) -> tuple[ForceComparison, ...]:
     """Compare the force of each foot with its plate's, of all stances together; none without any.
 
-    The motion is of :func:`manikin.recordings.dynamics.recorded_forces.motion_on_contacts`, the plates' top
-    is at a height [m]. The way is that of the centre of mass over the stance.
+    Frames count in which the foot stands by the motion and is alone on its plate. The motion is of
+    :func:`manikin.recordings.dynamics.recorded_forces.motion_on_contacts`, the plates' top is at a height
+    [m]. The way is that of the centre of mass over these frames, of at least :data:`LEAST_WAY`.
     """
     weight, pairs = GRAVITY * dynamics.body.mass, []
     theirs = wrench_about(measured.of_effector, np.array([0.0, 0.0, height]))
-    for side in SIDES:
+    for side, left in zip(SIDES, (1.0, -1.0), strict=True):
         if (name := f"{side}_foot") not in motion.contact_names or name not in measured.effectors:
             continue
         mine, other = motion.contact_names.index(name), measured.effectors.index(name)
         for first, stop in mask_runs(measured.alone[:, other] & motion.support[:, mine]):
             way = (dynamics.com[stop - 1] - dynamics.com[first])[:2]
-            if (length := float(np.linalg.norm(way))) > 0.0:
-                ours = motion.contact_force[first:stop, mine]
-                pairs.append([_components(one, way / length) for one in (ours, theirs[first:stop, other])])
+            if (length := float(np.linalg.norm(way))) >= LEAST_WAY:
+                both = motion.contact_force[first:stop, mine], theirs[first:stop, other]
+                pairs.append([_components(one, way / length, left) for one in both])
     if not pairs:
         return ()
     ours, plates = (np.vstack(ones) / weight for ones in zip(*pairs, strict=True))
@@ -352,9 +355,12 @@ def compare_foot_forces(
     return tuple(found)
 
 
-def _components(wrench: FloatArray, way: FloatArray) -> FloatArray:
-    """(n, 4) components of wrenches (n, 6) about points of the ground, for a direction (2,) of length 1."""
+def _components(wrench: FloatArray, way: FloatArray, left: float) -> FloatArray:
+    """(n, 4) components of wrenches (n, 6) about points of the ground, for a direction (2,) of length 1.
+
+    ``left`` is 1 of a left foot and -1 of a right one.
+    """
     (x, y, up), (mx, my, mz) = wrench[:, :3].T, wrench[:, 3:].T
     with np.errstate(divide="ignore", invalid="ignore"):
         free = mz + (my * y + mx * x) / up
-    return np.stack([way[0] * x + way[1] * y, way[0] * y - way[1] * x, up, free], axis=1)
+    return np.stack([way[0] * x + way[1] * y, left * (way[0] * y - way[1] * x), up, left * free], axis=1)

@@ -23,7 +23,6 @@ of two frames).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -65,6 +64,32 @@ MOTION_CUTOFF, FEWEST_FRAMES = 6.0, 4
 """Frequency above which a walk has little but noise [Hz] (Winter, Biomechanics and Motor Control, 2.2.4)."""
 
 
+@dataclass(frozen=True)
+class LocalCutoff:
+    """A cutoff that is higher about touch-downs.
+
+    Attributes:
+        usual: Far from touch-downs [Hz]; ``highest`` at one [Hz].
+        width: Time from a touch-down in which it falls to 1/e of its rise [s].
+    """
+
+    usual: float
+    highest: float
+    width: float = 0.08
+
+    def __post_init__(self) -> None:
+        finite_number(self.usual, "cutoff [Hz]", above=0.0)
+        finite_number(self.highest, "highest cutoff [Hz]", at_least=self.usual)
+        finite_number(self.width, "width [s]", above=0.0)
+
+    def at(self, time: FloatArray, touch_downs: Sequence[float]) -> FloatArray:
+        """(n,) at instants (n,) [s]: a bell over each touch-down, the highest [Hz]."""
+        found, rise = np.full(len(time), self.usual), self.highest - self.usual
+        for instant in touch_downs:
+            found = np.maximum(found, self.usual + rise * np.exp(-(((time - instant) / self.width) ** 2)))
+        return found
+
+
 def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruction:
     """A reconstruction low-passed by a Butterworth filter of second order, forward and backward.
 
@@ -79,7 +104,7 @@ def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruc
 
 
 def smoothed_postures(
-    found: Reconstruction, cutoff: "float | LocalCutoff" = MOTION_CUTOFF, limits: bool = True,
+    found: Reconstruction, cutoff: float | LocalCutoff = MOTION_CUTOFF, limits: bool = True,
     touch_downs: Sequence[float] = (),
 ) -> FloatArray:  # fmt: skip
     """(n, nq) postures of :func:`smoothed`, without their residuals.
@@ -89,7 +114,6 @@ def smoothed_postures(
     it is the Butterworth filter's.
     """
     rate, local = _rate(found), cutoff if isinstance(cutoff, LocalCutoff) else LocalCutoff(cutoff, cutoff)
-    finite_number(local.usual, "cutoff [Hz]", above=0.0)
     if local.usual >= 0.5 * rate:
         raise InputError(f"cutoff is {local.usual:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
     q = align_quaternions(found.q)
@@ -137,27 +161,6 @@ def _rate(found: Reconstruction) -> float:
     return found.rate
 
 
-@dataclass(frozen=True)
-class LocalCutoff:
-    """A cutoff that is higher about touch-downs.
-
-    Attributes:
-        usual: Far from touch-downs [Hz]; ``highest`` at one [Hz].
-        width: Time from a touch-down in which it falls to 1/e of its rise [s].
-    """
-
-    usual: float
-    highest: float
-    width: float = 0.08
-
-    def at(self, time: FloatArray, touch_downs: Sequence[float]) -> FloatArray:
-        """(n,) at instants (n,) [s]: a bell over each touch-down, the highest [Hz]."""
-        found, rise = np.full(len(time), self.usual), self.highest - self.usual
-        for instant in touch_downs:
-            found = np.maximum(found, self.usual + rise * np.exp(-(((time - instant) / self.width) ** 2)))
-        return found
-
-
 HIGHEST_SHARE = 0.45
 """Highest cutoff per rate of the recording: faster motion aliases."""
 
@@ -165,8 +168,9 @@ HIGHEST_SHARE = 0.45
 def smooth(values: FloatArray, rate: float, cutoff: FloatArray) -> FloatArray:
     """(n, k) columns low-passed with a cutoff (n,) below half the rate for each instant [Hz].
 
-    The amplitude is halved at the cutoff, of at most :data:`HIGHEST_SHARE`. Both ends are continued as point
-    reflections, so that a straight line stays as it is. There are at least two instants at an even rate.
+    The amplitude is halved at the cutoff, of at most :data:`HIGHEST_SHARE` of the rate. Both ends are
+    continued as point reflections, so that a straight line stays as it is. There are at least two instants at
+    an even rate.
     """
     cutoff = np.minimum(cutoff, HIGHEST_SHARE * rate)
     pad = min(len(values) - 1, int(np.ceil(2.0 * rate / float(cutoff.min()))))
@@ -261,7 +265,8 @@ def dynamics_of(
         found: At least four instants at an even rate, not yet smoothed.
         cutoff: Of the low-pass of the postures [Hz]; those of :data:`CUTOFF` when omitted, with the centre of
             mass at its own height of :data:`HEIGHT_CUTOFF`.
-        touch_downs: Instants at which these rise for a moment, see :func:`touch_downs_of` [s].
+        touch_downs: Instants at which those rise for a moment, see :func:`touch_downs_of` [s]; a cutoff that
+            is given does not.
     """
     if cutoff is not None:
         return dynamics_of_postures(found, smoothed_postures(found, cutoff, limits=False))
@@ -272,16 +277,24 @@ def dynamics_of(
     return dynamics_of_postures(found, q)
 
 
+ALREADY = 0.1
+"""Time for which another support has lasted where a touch-down is not that of a flight [s]."""
+
+
 def touch_downs_of(supports: RecordedSupports) -> tuple[float, ...]:
-    """Instants at which a support begins beside another one, on the clock of the reconstruction [s].
+    """Instants at which a support begins beside a lasting one, on the clock of the reconstruction [s].
 
     Who lands from a flight swings through a whole period of the low-pass in one support: a cutoff that rises
-    there adds the wobble of the markers at the impact.
+    there adds the wobble of the markers at the impact. The second foot of such a landing is no other case.
     """
-    beside = {phase.start for before, phase in pairwise(supports.phases) if before.effectors}
+    every = supports.supports
     return tuple(
-        one.start - supports.start for one in supports.supports if one.start_seen and one.start in beside
-    )
+        one.start - supports.start for one in every
+        if one.start_seen and any(
+            other.end > one.start and (other.start + ALREADY <= one.start or not other.start_seen)
+            for other in every if other is not one
+        )
+    )  # fmt: skip
 
 
 def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynamics:

@@ -7,11 +7,10 @@ to the wrench in every frame, those are chosen whose wrenches ``f_i`` at the con
     ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 + |m_i|^2 / A^2 dt``,
 
 with ``f_i = 0`` before the contact is made and after it is left, and ``m_i`` the moment of the contact about
-a point above the centre of mass: forces on people who walk or run meet there (Maus et al., "Upright human
-gait did not provide a major mechanical challenge for our ancestors", Nature Comm. 1, 2010). So the rear foot
+a point above the centre of mass: forces on people who walk or run meet there ([Maus2010]_). So the rear foot
 pushes ahead while the front one brakes; least forces would not have the feet push against each other at all.
 That a foot goes on with what it supplies alone before and after is the idea of [Ren2008]_, for contacts of
-any number and kind.
+any number and kind. It was compared with plates under walkers, and under one who rises from a seat.
 
 Shares that the contacts can give stay as they are. Others become pushes within the friction pyramids: with
 ``G`` the wrenches of unit pushes at the corners, one a column, and ``l`` the pushes of each contact that come
@@ -49,8 +48,8 @@ SLOW = 0.2
 walk would have it longer, under one who stands after a step shorter."""
 
 AIM, ABOVE = 0.015, 0.2
-"""``A`` [m.s], and height above the centre of mass of the point where forces meet [m]: with half and twice of
-``A``, and on the centre of mass, forces ahead under people who walk are as near to those of plates."""
+"""``A`` [m.s], and height above the centre of mass of the point where forces meet [m], as [Maus2010]_. With
+half and twice of ``A``, or on the centre of mass, forces along the way of walkers are as near to plates'."""
 
 ALONE = 0.05
 """Time for which a contact has to carry alone to define its load in an adjoining support of several [s]:
@@ -164,7 +163,7 @@ def _smooth_run(
     sums = _sums(frame, places[frame, contact] - middle[frame], end - first)
     moments = wrench_map(meeting[first:end][frame] - places[frame, contact])[:, 3:] * (step / AIM)
     moments[..., 3:] *= LEVER
-    sizes = sparse.block_diag(list(moments.swapaxes(1, 2) @ moments), format="csr")
+    sizes = sparse.bsr_array((moments.swapaxes(1, 2) @ moments, np.arange(count), np.arange(count + 1)))
     system = sparse.block_array([[sparse.kron(cost, np.eye(6)) + sizes, sums.T], [sums, None]])
     right = np.concatenate([(change.T @ known).ravel(), total[begins].ravel()])
     solved = splu(sparse.csc_matrix(system)).solve(right)[: 6 * count].reshape(count, 6)

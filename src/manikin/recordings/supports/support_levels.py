@@ -44,7 +44,7 @@ REST = 0.12
 
 TOUCH_SHARE, LIFT_SHARE = 0.10, 0.20
 """Shares of the highest speed of its swing below which a point has touched down, above which lifted off: the
-least errors against force plates of 25 laboratories, whichever of them is left out."""
+least errors against force plates, whichever laboratory is left out (``docs/laboratories.md``)."""
 
 NEVER_AT_REST = (2.0 * REST, 4.0 * REST, 8.0 * REST, 16.0 * REST)
 """Speeds at which soles are looked at in turn where none ever rests, as in running [m/s]."""
