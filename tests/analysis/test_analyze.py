@@ -231,7 +231,11 @@ def test_plates_that_carry_another_mass_than_the_file_tells_are_remarked(recordi
     path = recordings_folder / "grf/btkdata/PiG_Motion-FlatFoot-One.c3d"
     found = analyze_file(path)
     assert found.body.mass == pytest.approx(66.5)
-    assert found.as_dict()["force_plates"]["mass_kg"] == pytest.approx(61.3, abs=0.3)
+    plates = found.as_dict()["force_plates"]
+    assert plates["mass_kg"] == pytest.approx(61.3, abs=0.3)
+    for feet in (plates["foot_forces"], plates["foot_forces_shifted"]):
+        assert set(feet) == {"ahead", "aside", "up", "free_moment"}
+        assert feet["up"]["r"] > 0.9
     assert any(re.search(r"carry 61\.\d kg, not 66\.5 kg", line) for line in found.remarks)
     lighter = analyze_file(path, AnalysisOptions(mass=61.3))
     assert not any("carry" in line for line in lighter.remarks)

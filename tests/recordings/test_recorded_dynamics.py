@@ -39,6 +39,7 @@ from manikin.recordings import (
     without_offsets,
 )
 from manikin.recordings.dynamics.plate_forces import compare_foot_forces
+from manikin.recordings.dynamics.recorded_dynamics import HEIGHT_CUTOFF
 from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
 from manikin.recordings.reconstruction.reconstruct import unmeasured_upright
 from manikin.recordings.supports.body_supports import Support
@@ -242,6 +243,21 @@ def test_plates_under_both_feet_tell_the_mass(swinging, dynamics):
     assert (shown.frames, shown.single_frames) == (FRAMES, FRAMES)
     assert shown.vertical_rms < 1e-3
     assert shown.cop_rms < 1e-3
+
+
+def test_the_height_of_the_centre_of_mass_has_a_cutoff_of_its_own():
+    """A bob of 6 Hz by 5 mm: ``1 / (1 + (sin / sin)^4)`` of it is left, of 5 Hz, and of 7 at touch-downs."""
+    found = moving()
+    q = np.array(found.q)
+    q[:, 2] += 0.005 * np.sin(2.0 * np.pi * 6.0 * TIME)
+    found = replace(found, q=q)
+    every = np.arange(0.0, 3.01, 0.1)
+    for touch_downs, cutoff in (((), HEIGHT_CUTOFF.usual), (every, HEIGHT_CUTOFF.highest)):
+        height = dynamics_of(found, touch_downs=touch_downs).com[INNER, 2]
+        left = np.sqrt(2.0) * np.std(height) / 0.005
+        # Between bells 0.1 s apart the cutoff falls by 0.06 Hz.
+        wanted = 1.0 / (1.0 + (np.sin(0.06 * np.pi) / np.sin(np.pi * cutoff / RATE)) ** 4)
+        assert left == pytest.approx(wanted, rel=0.03)
 
 
 def test_the_force_of_a_foot_is_compared_by_components(swinging, dynamics):
