@@ -1,7 +1,5 @@
 """Weighted multi-task control of a planned motion ([Qiu2012]_ 6.3)."""
 
-import math
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +14,7 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel
 from manikin.control import edge_forces, tasks
 from manikin.control.build_qp import ControlProblem, JointBounds, LoadedContact, build_qp
 from manikin.control.capture_step import ShiftedPlan
+from manikin.control.delay import DelayEstimator, PendingDecisions
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.edge_forces import ContactGeometry, contact_geometry, segment_key
 from manikin.control.estimate import StateEstimator, StateNoise
@@ -143,15 +142,15 @@ class Controller:
         stepping = self.settings.stepping
         self.shift = None if stepping is None else ShiftedPlan(schedule, stepping, self.settings.period)
         self._previous = np.zeros(joints)
-        noise, period = self.settings.noise, self.settings.period
-        pending = math.ceil(self.settings.lead / period)
-        self._decided = deque([np.zeros(body.nv)], maxlen=max(1, pending))
+        noise, period, delay = self.settings.noise, self.settings.period, self.settings.delay
+        self._pending, self._late = PendingDecisions(body.nv, delay, period), DelayEstimator(delay, period)
         self._estimator = StateEstimator(body, noise, period) if noise != StateNoise() else None
         self._carried: dict[str, float] = {}
 
     def step(
-        self, time: float, q: FloatArray, v: FloatArray, touching: Mapping[str, bool] | None = None
-    ) -> ControlOutput:
+        self, time: float, q: FloatArray, v: FloatArray, touching: Mapping[str, bool] | None = None,
+        felt: FloatArray | None = None,
+    ) -> ControlOutput:  # fmt: skip
         """Decide the joint torques of the next period.
 
         Args:
@@ -159,13 +158,22 @@ class Controller:
             q: (nq,) measured configuration.
             v: (nv,) measured velocity.
             touching: Whether each effector is felt to touch; the schedule is trusted where it says nothing.
+            felt: (nv - 6,) mean joint torques of the last period [N.m], by which the delay is found; the
+                believed one is trusted without them.
         """
         clock, waited, rate = self.clock, self.clock.waited, self.clock.rate
-        time = clock.at(time) + self.settings.lead
+        if felt is not None:
+            self._late.felt(felt)
+            self._pending.delay = self._late.delay
+        time = clock.at(time) + self._pending.delay
         supports = self._switch.update(time, touching)
+        disturbance = np.zeros(len(v))
         if self._estimator is not None:
-            q, v = self._estimator.update(q, v, self._decided[0])
-        state = self._dynamics.evaluate(*self._foreseen(q, v), self.carried_at(time))
+            q, v = self._estimator.update(q, v, self._pending.acted())
+            disturbance = self._estimator.disturbance
+        state = self._dynamics.evaluate(*self._foreseen(q, v, disturbance), self.carried_at(time))
+        if self._estimator is not None:
+            state = replace(state, bias=state.bias - state.mass_matrix @ disturbance)
         # Where the plan is at its own time, which passes now, and how far the body is from it.
         reference, deviation = self.reference.sample(time, rate, rate), None
         if self.shift is not None:
@@ -182,7 +190,8 @@ class Controller:
         if solution is not None:
             x, iterations = solution.x, solution.iterations
             self._previous = problem.torque(x)
-            self._decided.append(problem.acceleration(x).copy())
+            self._pending.append(problem.acceleration(x) - disturbance)
+            self._late.commanded(self._previous)
             for name, load in problem.normal_forces(x).items():  # what it carries until its unloading begins
                 if supports[name].unload_share >= 1.0:
                     self._carried[name] = load
@@ -191,14 +200,15 @@ class Controller:
             reference, problem, iterations, waited,
         )  # fmt: skip
 
-    def _foreseen(self, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _foreseen(
+        self, q: FloatArray, v: FloatArray, disturbance: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """The state when the torques that are decided on now act, by the accelerations decided on."""
-        lead = self.settings.lead
-        if lead == 0.0:
-            return q, v
-        before = np.mean(self._decided, axis=0)
-        way = lead * v + 0.5 * lead**2 * before
-        return pin.integrate(self.body.pinocchio, q, way), v + lead * before
+        way, rate = np.zeros(len(v)), v
+        for time, decided in self._pending.coming():
+            way = way + time * rate + 0.5 * time**2 * (decided + disturbance)
+            rate = rate + time * (decided + disturbance)
+        return (q, v) if rate is v else (pin.integrate(self.body.pinocchio, q, way), rate)
 
     def carried_at(self, time: float) -> Mapping[str, float]:
         """Point masses [kg] that effectors carry at a time of the plan [s]."""

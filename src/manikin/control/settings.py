@@ -248,8 +248,8 @@ class ControlSettings:
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
         returning: What to do when the body is off its plan; None follows the plan as ever.
         stepping: How the steps of a walk are moved when the body is off its plan; None never moves them.
-        lead: Time by which torques are believed to act later than they are asked for [s]: they are those of
-            the state that is foreseen for then.
+        delay: Time by which torques are believed to act later than they are asked for [s], until torques that
+            are felt tell another one: they are those of the state that is foreseen for then.
         noise: Of the state that control is told, which is estimated then; without any it is believed.
         watch_toes: Whether toes that bounce off as a foot lands carry nothing until they are down again, and
             come down fast, by torques that know their inertia in the engine; for motions that land at speed.
@@ -265,7 +265,7 @@ class ControlSettings:
     max_joint_acceleration: float = 500.0
     returning: ReturnSettings | None = None
     stepping: ShiftSettings | None = None
-    lead: float = 0.0
+    delay: float = 0.0
     noise: StateNoise = field(default_factory=StateNoise)
     watch_toes: bool = False
     toes_back: Impedance = Impedance(2500.0, 100.0)
@@ -273,4 +273,4 @@ class ControlSettings:
     def __post_init__(self) -> None:
         for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):
             finite_number(getattr(self, name), f"control setting {name!r}", above=0.0)
-        finite_number(self.lead, "control setting 'lead'", at_least=0.0)
+        finite_number(self.delay, "control setting 'delay'", at_least=0.0)

@@ -170,6 +170,9 @@ class _Run:
             self.world.apply_push(push)
         delay = 0 if truth is None else round(truth.delay / step)
         self._commands = deque[FloatArray](maxlen=delay + 1)
+        self._felt: FloatArray | None = None
+        strength = np.maximum(body.torque_upper, -body.torque_lower)
+        self._strength = np.where(np.isfinite(strength), strength, 0.0)
         self._noise = np.random.default_rng(0 if truth is None else truth.seed)
         self._segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, self._segments)
@@ -198,7 +201,7 @@ class _Run:
             plan_time = self.controller.clock.at(time)
             self._switch(plan_time)
             before = clock.perf_counter()
-            output = self.controller.step(time, *self._told(), self._touching(plan_time))
+            output = self.controller.step(time, *self._told(), self._touching(plan_time), self._felt)
             control += clock.perf_counter() - before
             if number == 0:
                 self.world.forget()
@@ -242,13 +245,17 @@ class _Run:
         return (q, v) if self.truth is None else self.truth.noise.told(self.body, q, v, self._noise)
 
     def _advance(self, tau: FloatArray, steps: int) -> None:
-        """Command torques for a number of engine steps; they act after the true delay."""
-        if self._commands.maxlen == 1:
+        """Command torques for a number of engine steps; they act after the true delay, and are felt."""
+        if self.truth is None:
             self.world.advance(tau, steps)
             return
+        acted = np.zeros(len(tau))
         for _ in range(steps):
             self._commands.append(tau)
             self.world.advance(self._commands[0], 1)
+            acted += self._commands[0]
+        noise = self.truth.torque_noise * self._strength * self._noise.standard_normal(len(tau))
+        self._felt = acted / steps + noise
 
     def _switch(self, time: float) -> None:
         """Set the touches planned at a time of the plan, and hold on to grasps."""

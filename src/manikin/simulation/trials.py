@@ -99,8 +99,8 @@ def run_trials(
 ) -> Trials:  # fmt: skip
     """Execute a plan in worlds drawn from an uncertainty.
 
-    Control knows of it that torques act later than they are asked for, by half of the longest delay, and how
-    noisy the state is that it is told.
+    Control knows of it how noisy the state is that it is told, and that torques act later than they are asked
+    for: by half of the longest delay, until those that it feels tell better.
 
     Args:
         count: Worlds, at least one.
@@ -111,7 +111,7 @@ def run_trials(
     """
     drawn = np.random.default_rng(seed).integers(2**32, size=count).tolist()
     uncertainty = uncertainty or Uncertainty()
-    known = replace(task.settings, lead=0.5 * uncertainty.delay_s, noise=uncertainty.noise)
+    known = replace(task.settings, delay=0.5 * uncertainty.delay_s, noise=uncertainty.noise)
     told = replace(task.bare(), settings=known)
     items = [_World(told, uncertainty, number) for number in drawn]
     found: dict[int, Trial] = {}

@@ -27,6 +27,7 @@ class TrueWorld:
         friction: True friction relative to the believed one.
         delay: From a torque's command until it acts [s].
         noise: Of the state that control is told.
+        torque_noise: Standard deviation of the joint torques that it feels, relative to the strength.
         joints: (nv - 6,) by how much the first hinge angles differ from the plan's [rad].
         pushes: Forces that disturb the body.
         seed: Of the noise.
@@ -37,6 +38,7 @@ class TrueWorld:
     friction: float
     delay: float
     noise: StateNoise
+    torque_noise: float
     joints: FloatArray
     pushes: tuple[Push, ...]
     seed: int
@@ -55,6 +57,8 @@ class Uncertainty:
         angle_noise_deg: Standard deviation of the angles that control is told [deg].
         position_noise_m: The same of the root's position [m].
         velocity_noise_m_s: The same of its velocity [m/s].
+        torque_noise_share: Standard deviation of the joint torques that control feels, relative to the
+            strength.
         joints_deg: Largest error of each hinge at the beginning [deg].
         push_N: Force of a push on the thorax, or on the root of a body without one, in any level direction
             at any time [N].
@@ -69,6 +73,7 @@ class Uncertainty:
     angle_noise_deg: float = 0.1
     position_noise_m: float = 0.001
     velocity_noise_m_s: float = 0.005
+    torque_noise_share: float = 0.01
     joints_deg: float = 1.0
     push_N: float = 50.0
     push_s: float = 0.1
@@ -111,7 +116,7 @@ class Uncertainty:
             push = replace(push, segment=names[0])
         pushes = (push,) if pushed else ()
         true, raised = self._weighed(body, rng), self._raised(scene, rng)
-        return TrueWorld(true, raised, rub, delay, self.noise, joints, pushes, seed)
+        return TrueWorld(true, raised, rub, delay, self.noise, self.torque_noise_share, joints, pushes, seed)
 
     def _weighed(self, body: BodyModel, rng: np.random.Generator) -> BodyModel:
         """The body with other masses, and its centre of mass elsewhere."""

@@ -59,6 +59,9 @@ class UncertaintySection(Section):
     )
     position_noise_m: NonNegative | None = optional("the same of the root's position [m] (default: 0.001)")
     velocity_noise_m_s: NonNegative | None = optional("the same of its velocity [m/s] (default: 0.005)")
+    torque_noise_share: NonNegative | None = optional(
+        "standard deviation of the joint torques that control feels, relative to the strength (default: 0.01)"
+    )
     joints_deg: NonNegative | None = optional(
         "largest error of each hinge at the beginning [deg] (default: 1)"
     )
