@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 import shapely
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from manikin.contact import sole
 from manikin.errors import ContactError
+from manikin.numerics.polytope import polygon_area
 from manikin.numerics.spatial import rotation_from_rpy, rotation_from_yaw
 from manikin.scene import Box, Capsule, Cylinder, FootingTable, HalfSpace, Mesh, Obstacle, Scene, Surface
 
@@ -202,3 +205,36 @@ def test_bars_that_a_hand_can_close_round_have_grasp_lines():
         if axis_point is not None:
             assert (strip.centre - axis_point) @ strip.normal == pytest.approx(0.02)
         assert abs(strip.normal @ turn[:, 2]) < 1e-9
+
+
+def plank_onto_block():
+    """Feet on a plank 0.264 m wide that ends at a block 0.8 m wide, and the number of their one surface."""
+    items = [
+        box("block", (0.0, -0.4, 0.0), (0.8, 0.4, 0.3)),
+        box("plank", (-1.0, -0.132, 0.25), (0.0, 0.132, 0.3)),
+    ]
+    table = FootingTable(Scene(items, None).surfaces_facing(UP, 0.5), SOLE)
+    return table, next(k for k, item in enumerate(table.surfaces) if len(item.obstacles) == 2)
+
+
+@given(st.floats(-0.4, 0.2), st.floats(-0.2, 0.2), st.floats(-np.pi, np.pi))
+def test_a_sole_on_a_corner_inwards_touches_with_a_convex_piece(x, y, yaw):
+    """All of its polygon lies on plank or block, or no such piece is large enough and the hull is left."""
+    table, top = plank_onto_block()
+    place, turn = np.array([x, y, 0.3]), rotation_from_yaw(yaw)
+    footing = table.place([top], place[None], turn[None])
+    polygon, hull = table.convex_polygon(top, place, turn), footing.polygon(0)
+    if footing.stands[0] and not np.array_equal(polygon, hull):
+        weights = np.random.default_rng(0).dirichlet(np.ones(len(polygon)), 200)
+        x, y = ((weights @ polygon) @ turn[:2, :2].T + place[:2]).T
+        on_block = (x >= -1e-9) & (x <= 0.8 + 1e-9) & (np.abs(y) <= 0.4 + 1e-9)
+        assert (on_block | ((x <= 1e-9) & (np.abs(y) <= 0.132 + 1e-9))).all()
+        assert 0.6 * 0.28 * 0.10 - 1e-9 <= polygon_area(polygon) < polygon_area(hull)
+
+
+def test_toes_on_a_block_and_a_heel_on_a_plank_do_not_span_the_notch_between():
+    """22 mm of the heel hang over beside the plank: so much less of the sole touches, along all of it."""
+    table, top = plank_onto_block()
+    polygon = table.convex_polygon(top, np.array([-0.12, -0.104, 0.3]), np.eye(3))
+    assert polygon[:, 1].min() == pytest.approx(-0.028)
+    assert polygon_area(polygon) == pytest.approx(0.28 * 0.078)

@@ -8,10 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from numpy.typing import ArrayLike, NDArray
+from shapely.geometry.polygon import orient
 
 from manikin.contact.contact import MOST_CORNERS
-from manikin.numerics.polytope import convex_polygon, fewer_corners, walls
+from manikin.numerics.polytope import convex_polygon, fewer_corners, polygon_area, walls
 from manikin.numerics.spatial import FloatArray, cross
 from manikin.scene.surface import Surface, walls_of
 from manikin.scene.triangles import IntArray
@@ -20,6 +22,10 @@ LEAST_SHARE = 0.6
 """Least share of a sole's area that has to lie on its surface."""
 WHOLE = 1.0 - 1e-6
 """Share from which on a sole lies on its surface with all of it."""
+
+_INWARDS, _FLAT, _FAR = 1e-3, 1e-9, 10.0
+"""Share of a sole's area by which its hull spans more than lies on the surface; turns that count as none
+[m^2]; more than any sole is long [m]."""
 
 _Clipped = tuple[NDArray[np.bool_], FloatArray, FloatArray]
 """Of each edge whether a part is inside a sole (p,), and where that begins and ends (p, 2) [m]."""
@@ -165,6 +171,24 @@ class FootingTable:
         stands[hanging] = (share[hanging] >= LEAST_SHARE) & _around_origin(*spanning, hanging)
         return Footing(share, stands, self.footprint, *spanning)
 
+    def convex_polygon(self, number: int, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """(k, 2) contact polygon of one sole in the effector's frame [m], all of which lies on its surface.
+
+        The hull of what of a sole is on a surface with a corner inwards, as of a plank that ends on a wide
+        block, spans what is beside it as well. Of its parts, such as toes, that is wrong: what is left is a
+        large convex piece of the surface, if a sole stands with that, else the hull.
+        """
+        footing = self.place([number], position[None], rotation[None])
+        hull, on = footing.polygon(0), float(footing.share[0]) * self._sole.area
+        if not footing.stands[0] or on >= polygon_area(hull) - _INWARDS * self._sole.area:
+            return hull
+        surface = self.surfaces[number]
+        rings = [(ring - position) @ rotation[:, :2] for ring in (surface.polygon, *surface.holes)]
+        region = shapely.Polygon(rings[0], rings[1:]) & shapely.Polygon(self.footprint)
+        piece = _convex_piece(region)
+        whole = piece.area >= LEAST_SHARE * self._sole.area and piece.contains(shapely.Point(0.0, 0.0))
+        return fewer_corners(convex_polygon(shapely.get_coordinates(piece)), MOST_CORNERS) if whole else hull
+
     def standing(self, places: Places) -> FloatArray:
         """(k,) share of its area of each sole that stands, 0 of others: :meth:`place` without polygons."""
         room = self._room(places)
@@ -260,6 +284,28 @@ class FootingTable:
         rows = np.concatenate([hanging[row], of[crossing], of[crossing]])
         order = np.argsort(rows, kind="stable")
         return rows[order], points[order]
+
+
+def _convex_piece(region: shapely.Geometry) -> shapely.Polygon:
+    """A large convex piece of a region: it is cut along the edges of its corners inwards, one by one."""
+    for _ in range(MOST_CORNERS):
+        piece = max(shapely.get_parts(region), key=shapely.area)
+        if piece.geom_type != "Polygon" or piece.is_empty:
+            break
+        ring = shapely.get_coordinates(orient(shapely.Polygon(piece.exterior)).exterior)[:-1]
+        along = np.roll(ring, -1, axis=0) - ring
+        before = np.roll(along, 1, axis=0)
+        inwards = np.flatnonzero(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0] < -_FLAT)
+        if not len(inwards):
+            return piece
+        corner = int(inwards[0])
+        cuts = []
+        for way in (before[corner], along[corner]):
+            way = _FAR * way / np.linalg.norm(way)
+            left, at = np.array([-way[1], way[0]]), ring[corner]
+            cuts.append(piece & shapely.Polygon([at - way, at + way, at + way + left, at - way + left]))
+        region = max(cuts, key=lambda cut: max(part.area for part in shapely.get_parts(cut)))
+    return shapely.Polygon()
 
 
 class _Ranges:
