@@ -6,6 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -568,3 +569,23 @@ def test_a_foot_lies_on_a_tread_that_has_room_for_it():
     for contact in soles:
         across, along = np.ptp(contact.points[:, 1]), np.ptp(contact.points[:, 0])
         assert across * along > 0.8 * body.sole_length * body.sole_width
+
+
+def test_a_body_passes_beside_thin_posts_and_not_astride_of_them():
+    """No post is in the triangle between a foot that stands and the two places of the one that moves.
+
+    Posts 0.15 m thick and 1.2 m high stand by turns left and right of the way. Room for the trunk was sought
+    at the places of two feet alone, of which one was before a post and the next one behind it.
+    """
+    places = [(0.7, 0.12), (1.632, -0.12), (2.55, 0.12), (3.319, -0.12)]
+    posts = [
+        Obstacle(f"post_{k}", Box((0.15, 0.15, 1.2)), translation=(*place, 0.6))
+        for k, place in enumerate(places)
+    ]
+    found, _, _ = planned(Scene(posts), (4.17, 0.0), body=human(1.51, 47.4, "female"))
+    assert found.plan is not None
+    feet = [{foot: one.position[:2] for foot, one in stage.contacts.items()} for stage in found.plan.stages]
+    both = [held for held in feet if len(held) == 2]
+    for before, after in pairwise(both):
+        triangle = shapely.MultiPoint([*before.values(), *after.values()]).convex_hull
+        assert not any(triangle.contains(shapely.Point(place)) for place in places)

@@ -87,6 +87,7 @@ class FootstepSearch:
     def __init__(
         self, scene: Scene, footholds: Footholds, start: Feet, goal: Feet, scale: float,
         reach: tuple[StepReach, StepReach], pair_cost: Callable[[Foothold, Foothold], float],
+        passes: Callable[[Foothold, Foothold, Foothold], bool],
         column: tuple[float, float, float], stride: float, held: bool,
     ) -> None:  # fmt: skip
         """Prepare a search.
@@ -96,6 +97,7 @@ class FootstepSearch:
             reach: Places of one foot relative to the other that the body reaches, and those at which it rests
                 on either foot.
             pair_cost: Cost of the body between two footholds, left and right [s]; infinite without room.
+            passes: Whether foot and body pass from a foothold to another one beside a third that stands.
             column: Radius, lowest and highest end above the ground of what has to be free to pass [m].
             stride: Way between two feet that costs least over the ground, of a body of 1.75 m [m].
             held: Whether there may be something to hold on to.
@@ -106,7 +108,7 @@ class FootstepSearch:
         self.holds = [*start, *goal]
         self._keys: dict[int, int] = {}
         self._is_free = cache(lambda number: number < 4 or footholds.is_free(self.holds[number]))
-        self._passes = cache(lambda *numbers: footholds.passes(*(self.holds[number] for number in numbers)))
+        self._passes = cache(lambda *numbers: passes(*(self.holds[number] for number in numbers)))
         self._pairs = dict.fromkeys(((0, 1), (1, 0), (2, 3), (3, 2)), 0.0)  # postures are known at the ends
         self._next: dict[tuple[int, int], list[tuple[_Node, float]]] = {}
         self._closed: set[tuple[int, int]] = set()

@@ -46,6 +46,10 @@ CROSSED = 0.03  # depth to which straight ways of a high step may cross somethin
 HOLDS = 6  # most places of hands that are tried at a step
 
 
+UNSEEN, ASIDE = 0.12, (0.0, 0.06, -0.06)
+"""Shortest way of the trunk in a step half-way of which room for it is sought, and how far beside [m]."""
+
+
 @dataclass(frozen=True)
 class WalkSettings(Paces):
     """How a body goes on its feet; the values are our choice.
@@ -94,6 +98,21 @@ class BodyRoom:
         """Cost of a step in the cheapest posture that is free, beyond upright [s]; infinite without one."""
         number = int(self._clearance.cheapest(place.between[None])[0])
         return STEP * (self._postures[number].cost - 1.0) if number >= 0 else math.inf
+
+    def passes(self, before: _Stand, after: _Stand) -> bool:
+        """Whether the trunk has room half-way between two places, or a little beside it.
+
+        What is thinner than a step is long, such as a post, is not seen at the places themselves.
+        """
+        first, last = before.between, after.between
+        way = last - first
+        way[3] = math.remainder(way[3], 2.0 * math.pi)
+        length = math.hypot(way[0], way[1])
+        if length < UNSEEN:
+            return True
+        aside = np.array([-way[1], way[0], 0.0, 0.0]) / length
+        half = first + 0.5 * way + np.multiply.outer(ASIDE, aside)
+        return bool((self._clearance.cheapest(half) >= 0).any())
 
     def postures(self, places: Sequence[_Stand]) -> NDArray[np.int64]:
         """(k,) postures to take one after the other at places.
@@ -146,7 +165,7 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         ends = feet_of(start.contacts), feet_of(goal.contacts)
         self.search = FootstepSearch(
             scene, self._footholds, *ends, scale, (StepReach.of(body), StepReach.at_rest(body)),
-            self._pair_cost, (radius, low, high), self.settings.stride, self._handholds.exist,
+            self._pair_cost, self._passes, (radius, low, high), self.settings.stride, self._handholds.exist,
         )  # fmt: skip
         self._risen: tuple[Stage, ...] = ()
         self._lenient = False  # whether postures count that are too hard at rest
@@ -248,6 +267,11 @@ class WalkSearch(PosedSearch[int, tuple[int, int]]):
         most = NEAR_TRIES if rise < HIGH * self._scale else HIGH_TRIES
         if self.search.close(stand, step) >= ALIKE_TRIES or self.replanned >= most:
             self.search.refuse(stand, step)
+
+    def _passes(self, left: Foothold, reached: Foothold, standing: Foothold) -> bool:
+        """Whether a foot on its way and the trunk pass beside what is there."""
+        before, after = _Stand(left, standing), _Stand(reached, standing)
+        return self._footholds.passes(left, reached, standing) and self._room.passes(before, after)
 
     def _pair_cost(self, left: Foothold, right: Foothold) -> float:
         """Cost of the trunk's room, and of hands where feet alone do not make the step."""
