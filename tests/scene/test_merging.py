@@ -223,7 +223,7 @@ def test_a_sole_on_a_corner_inwards_touches_with_a_convex_piece(x, y, yaw):
     table, top = plank_onto_block()
     place, turn = np.array([x, y, 0.3]), rotation_from_yaw(yaw)
     footing = table.place([top], place[None], turn[None])
-    polygon, hull = table.convex_polygon(top, place, turn), footing.polygon(0)
+    polygon, hull = table.polygon(top, place, turn), footing.polygon(0)
     if footing.stands[0] and not np.array_equal(polygon, hull):
         weights = np.random.default_rng(0).dirichlet(np.ones(len(polygon)), 200)
         x, y = ((weights @ polygon) @ turn[:2, :2].T + place[:2]).T
@@ -235,6 +235,6 @@ def test_a_sole_on_a_corner_inwards_touches_with_a_convex_piece(x, y, yaw):
 def test_toes_on_a_block_and_a_heel_on_a_plank_do_not_span_the_notch_between():
     """22 mm of the heel hang over beside the plank: so much less of the sole touches, along all of it."""
     table, top = plank_onto_block()
-    polygon = table.convex_polygon(top, np.array([-0.12, -0.104, 0.3]), np.eye(3))
+    polygon = table.polygon(top, np.array([-0.12, -0.104, 0.3]), np.eye(3))
     assert polygon[:, 1].min() == pytest.approx(-0.028)
     assert polygon_area(polygon) == pytest.approx(0.28 * 0.078)

@@ -1,6 +1,7 @@
 """Plans in worlds that are not as believed: what is drawn, what acts, and what is told of it."""
 
 from dataclasses import replace
+from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
@@ -212,6 +213,22 @@ def test_late_torques_are_asked_for_ahead_of_time(body, stand, monkeypatch):
     assert changes[0] < 0.5 * changes[2]
     assert errors[0] < errors[2]
     assert changes[1] < 1.3 * changes[0]
+
+
+def test_the_delay_is_found_where_some_programs_are_not_solved(body, stand, monkeypatch):
+    """In every second step the torques before are asked for again; to half of the engine's step."""
+    plan = stand(0.7, lambda t: np.array([0.0, 0.0, -0.03]) * (1.0 - np.cos(np.pi * t / 0.7)))
+    late = replace(NOTHING.draw(body, Scene(), plan.motion, 0), delay=0.013)
+    run = _Run(
+        body, Scene(), plan.motion, plan.schedule, ControlSettings(delay=0.005), None, (), (), (), late
+    )
+    solve, steps = run.controller._solve, count()
+    monkeypatch.setattr(
+        run.controller, "_solve",
+        lambda problem: (None, "previous torques") if next(steps) % 2 else solve(problem),
+    )  # fmt: skip
+    assert not run.run(0.0, None).fell
+    assert run.controller._late.delay == pytest.approx(0.013, abs=5e-4)
 
 
 def test_a_trunk_heavier_on_one_side_is_held_upright(body, stand):

@@ -190,11 +190,11 @@ class Controller:
         if solution is not None:
             x, iterations = solution.x, solution.iterations
             self._previous = problem.torque(x)
-            self._pending.append(problem.acceleration(x) - disturbance)
-            self._late.commanded(self._previous)
             for name, load in problem.normal_forces(x).items():  # what it carries until its unloading begins
                 if supports[name].unload_share >= 1.0:
                     self._carried[name] = load
+        self._pending.append(problem.acceleration(x) - disturbance)
+        self._late.commanded(self._previous)
         return ControlOutput(
             self._previous, problem.acceleration(x).copy(), problem.wrenches(x), supports, fallback, state,
             reference, problem, iterations, waited,

@@ -22,7 +22,6 @@ MEMORY = 0.2
 CREEP = 0.4
 """The believed delay changes by at most this many periods per step, so that time always goes on."""
 
-
 TELLING = 9.0
 """Another delay is believed where the torques felt are nearer to it by this many times their variance."""
 

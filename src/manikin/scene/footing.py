@@ -171,12 +171,12 @@ class FootingTable:
         stands[hanging] = (share[hanging] >= LEAST_SHARE) & _around_origin(*spanning, hanging)
         return Footing(share, stands, self.footprint, *spanning)
 
-    def convex_polygon(self, number: int, position: FloatArray, rotation: FloatArray) -> FloatArray:
-        """(k, 2) contact polygon of one sole in the effector's frame [m], all of which lies on its surface.
+    def polygon(self, number: int, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """(k, 2) contact polygon of one sole in the effector's frame [m].
 
-        The hull of what of a sole is on a surface with a corner inwards, as of a plank that ends on a wide
-        block, spans what is beside it as well. Of its parts, such as toes, that is wrong: what is left is a
-        large convex piece of the surface, if a sole stands with that, else the hull.
+        That of its :class:`Footing`, but on a surface with a corner inwards, as of a plank that ends on a
+        wide block. The hull spans what is beside that as well, which is wrong of parts of the sole, such as
+        toes: a large convex piece of what lies on the surface takes its place, if the sole stands with that.
         """
         footing = self.place([number], position[None], rotation[None])
         hull, on = footing.polygon(0), float(footing.share[0]) * self._sole.area
@@ -184,7 +184,7 @@ class FootingTable:
             return hull
         surface = self.surfaces[number]
         rings = [(ring - position) @ rotation[:, :2] for ring in (surface.polygon, *surface.holes)]
-        region = shapely.Polygon(rings[0], rings[1:]) & shapely.Polygon(self.footprint)
+        region = shapely.make_valid(shapely.Polygon(rings[0], rings[1:])) & shapely.Polygon(self.footprint)
         piece = _convex_piece(region)
         whole = piece.area >= LEAST_SHARE * self._sole.area and piece.contains(shapely.Point(0.0, 0.0))
         return fewer_corners(convex_polygon(shapely.get_coordinates(piece)), MOST_CORNERS) if whole else hull
@@ -304,7 +304,7 @@ def _convex_piece(region: shapely.Geometry) -> shapely.Polygon:
             way = _FAR * way / np.linalg.norm(way)
             left, at = np.array([-way[1], way[0]]), ring[corner]
             cuts.append(piece & shapely.Polygon([at - way, at + way, at + way + left, at - way + left]))
-        region = max(cuts, key=lambda cut: max(part.area for part in shapely.get_parts(cut)))
+        region = max(cuts, key=lambda cut: max((part.area for part in shapely.get_parts(cut)), default=0.0))
     return shapely.Polygon()
 
 

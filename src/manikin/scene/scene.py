@@ -145,7 +145,7 @@ class Scene(Displayed):
         footing = table.place(rows, np.tile(place, (len(rows), 1)), np.tile(turn, (len(rows), 1, 1)))
         row = int(np.argmax(footing.share))
         share = float(footing.share[row])
-        return (footing.polygon(row) if footing.stands[row] else np.zeros((0, 2))), share
+        return (table.polygon(row, place, turn) if footing.stands[row] else np.zeros((0, 2))), share
 
     def nearest(self, point: ArrayLike) -> tuple[str, float]:
         """Nearest obstacle to a (3,) world point, and its signed distance [m]; SceneError without any."""

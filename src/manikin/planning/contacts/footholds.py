@@ -231,7 +231,7 @@ class Footholds:
         """Contact of a foot on a foothold, with a Coulomb coefficient."""
         (length, width), polygon = self.size, None
         if hold.share < WHOLE:
-            polygon = self._table.convex_polygon(hold.surface, hold.position, hold.rotation)
+            polygon = self._table.polygon(hold.surface, hold.position, hold.rotation)
         return sole(
             foot, hold.position, length=length, width=width, friction=friction, rotation=hold.rotation,
             polygon=polygon,

@@ -47,7 +47,8 @@ HOLDS = 6  # most places of hands that are tried at a step
 
 
 UNSEEN, ASIDE = 0.12, (0.0, 0.06, -0.06)
-"""Shortest way of the trunk in a step half-way of which room for it is sought, and how far beside [m]."""
+"""Shortest way of the trunk in a step half-way of which room for it is sought, and how far beside [m]; our
+choice."""
 
 
 @dataclass(frozen=True)
