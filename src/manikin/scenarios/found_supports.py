@@ -225,14 +225,14 @@ class _Supports:
     Attributes:
         passed: For each key instant, start and goal included, whether the body passes it without a rest.
         paces: Of each stage; empty where the body rests at every change.
-        may_roll: Whether feet may roll over heels and toes.
+        rolls: Whether feet roll over heels and toes.
     """
 
     scenario: Scenario
     plan: ContactPlan
     passed: Sequence[bool]
     paces: Sequence[Pace] = ()
-    may_roll: bool = False
+    rolls: bool = False
 
     def listed(self) -> Scenario:
         """The scenario with supports instead of contacts to be found."""
@@ -245,10 +245,10 @@ class _Supports:
             "planning_sole": {"length_m": share[0] * long, "width_m": share[1] * wide},
             "phases": [self._phase(number) for number in range(len(self.plan.stages))],
         }
-        if self._rolls:
+        if self.rolls:
             supports["foot"] = "rolling"
         manner = file.manner
-        if self._rolls and _is_level(self.plan, self.scenario):
+        if self.rolls and _is_level(self.plan, self.scenario):
             manner = "walking" if manner == type(file).model_fields["manner"].default else manner
         # Of a body that walks the region of its postures is known.
         constraints = _given_constraints(self.scenario) if walks else _constraints(self.scenario, self.plan)
@@ -268,10 +268,6 @@ class _Supports:
     @cached_property
     def _below(self) -> bool:
         return any(self.passed) and _passes_below(self.plan, self.scenario)
-
-    @property
-    def _rolls(self) -> bool:
-        return self.may_roll and not self._below
 
     @cached_property
     def _ground(self) -> Footholds:
@@ -308,7 +304,7 @@ class _Supports:
         least, most = pace * stage.min_duration, None
         if self.passed[number] and self.passed[number + 1] and any(self.passed):
             times = EASY if self.paces[number] is Pace.UNHURRIED else QUICK
-            least = pace * _walking_time(self.plan, number, self._ground, times, rolls=self._rolls)
+            least = pace * _walking_time(self.plan, number, self._ground, times, rolls=self.rolls)
             most = max(LONGEST, 1.5 * least)
         elif number < len(rise):
             least = pace * rise[number] * (EASY_RISE if self.paces[number] else 1.0)

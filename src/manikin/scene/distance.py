@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
 from manikin.scene.collision import Measured, Meter, collision_parts, pair_meter, part_meter
-from manikin.scene.distance_bounds import KnownDistances, PairBounds, PlacedShapes, PlacementReader
+from manikin.scene.distance_bounds import (
+    IntArray,
+    KnownDistances,
+    PairBounds,
+    PlacedShapes,
+    PlacementReader,
+)
 from manikin.scene.scene import Scene
 
 Pair = tuple[str, str]
@@ -265,36 +271,12 @@ class Proximity(BodyPairs):
     def minimum_over(
         self, q_samples: FloatArray, ignore: Ignored | Sequence[Ignored] = NOTHING, tolerance: float = 1e-6
     ) -> Clearance:
-        """Smallest signed distance over (n, nq) configurations, exact to ``tolerance`` [m].
+        """Smallest signed distance over (n, nq) configurations, see :meth:`MotionDistances.minimum`."""
+        return self.along(q_samples).minimum(ignore, tolerance)
 
-        Best first: every (sample, pair) has a lower bound, from covering spheres at first; measuring one of
-        them raises the bounds of its pair at all other samples, because a distance changes no faster than the
-        shape moves. Only what could still be the minimum is measured. Raises as :meth:`evaluate_over`.
-        """
-        samples = [checked_configuration(self._model, q) for q in q_samples]
-        considered = self._considered_over(ignore, len(samples))
-        placements = np.array([self._placements_at(q) for q in samples])
-        rotations, translations = _split(placements)
-        lower = self._bounds.lower(rotations, translations)
-        lower = np.where(considered, np.where(lower > 0.0, lower, -np.inf), np.inf)
-        queue = [(float(bound), pair) for pair, bound in enumerate(lower.min(axis=0)) if bound < np.inf]
-        heapq.heapify(queue)
-        best = Clearance(np.inf, None)
-        while queue and queue[0][0] < best.distance - tolerance:
-            _, pair = heapq.heappop(queue)
-            column = lower[:, pair]
-            sample = int(np.argmin(column))
-            distance = self._measure([pair], rotations[sample], translations[sample], -np.inf)[0][0]
-            if distance < best.distance:
-                best = Clearance(distance, self.pairs[pair], sample)
-            # Far from the sample the shape has moved too much for the bound to say anything.
-            start = max(0, sample - WINDOW)
-            rows = slice(start, sample + WINDOW + 1)
-            moved = self._bounds.displacement(pair, sample - start, rotations[rows], translations[rows])
-            np.maximum(column[rows], distance - moved, out=column[rows])
-            column[sample] = np.inf
-            heapq.heappush(queue, (float(column.min()), pair))
-        return best
+    def along(self, q_samples: FloatArray) -> "MotionDistances":
+        """Distances along a motion of (n, nq) configurations. Raises as :meth:`evaluate_over`."""
+        return MotionDistances(self, q_samples)
 
     def place(self, q_samples: FloatArray) -> PlacedShapes:
         """Shapes and Jacobians of configurations (n, nq); SceneError if one is not a finite vector."""
@@ -375,6 +357,83 @@ class Proximity(BodyPairs):
             else part_meter(first, self._parts[other - self._count])
         )  # fmt: skip
         return meter
+
+
+class MotionDistances:
+    """Smallest distances along a motion. What one query measures, the next ones know.
+
+    Every (sample, pair) has a lower bound, from covering spheres at first; measuring one of them raises the
+    bounds of its pair at other samples, because a distance changes no faster than the shape moves.
+
+    Attributes:
+        pairs: (body shape, obstacle or other body shape) of every pair.
+    """
+
+    pairs: tuple[Pair, ...]
+
+    def __init__(self, proximity: Proximity, q_samples: FloatArray) -> None:
+        self._proximity, self._bounds, self.pairs = proximity, proximity._bounds, proximity.pairs
+        samples = [checked_configuration(proximity._model, q) for q in q_samples]
+        self._rotations, self._translations = _split(
+            np.array([proximity._placements_at(q) for q in samples]).reshape(len(samples), -1, 4, 4)
+        )
+        lower = self._bounds.lower(self._rotations, self._translations)
+        self._lower = np.where(lower > 0.0, lower, -np.inf)
+        self._measured = np.zeros(lower.shape, dtype=np.bool_)
+        self._paths: dict[int, FloatArray] = {}
+
+    def minimum(
+        self,
+        ignore: Ignored | Sequence[Ignored] = NOTHING,
+        tolerance: float = 1e-6,
+        rows: IntArray | None = None,
+    ) -> Clearance:
+        """Smallest signed distance, exact to ``tolerance`` [m], at all samples or at ``rows`` (k,) of them.
+
+        Only what could still be the minimum is measured, best first. The sample is one of the motion's.
+        """
+        considered = self._proximity._considered_over(ignore, len(self._lower))
+        if rows is not None:
+            chosen = np.zeros((len(considered), 1), dtype=np.bool_)
+            chosen[rows] = True
+            considered = considered & chosen
+        known = np.where(considered & self._measured, self._lower, np.inf)
+        best = Clearance(np.inf, None)
+        if np.isfinite(known).any():
+            sample, pair = divmod(int(np.argmin(known)), known.shape[1])
+            best = Clearance(float(known[sample, pair]), self.pairs[pair], sample)
+        lower = np.where(considered & ~self._measured, self._lower, np.inf)
+        queue = [
+            (float(bound), pair)
+            for pair, bound in enumerate(lower.min(axis=0, initial=np.inf))
+            if bound < np.inf
+        ]
+        heapq.heapify(queue)
+        while queue and queue[0][0] < best.distance - tolerance:
+            _, pair = heapq.heappop(queue)
+            column = lower[:, pair]
+            sample = int(np.argmin(column))
+            distance = self._measure(sample, pair, column)
+            if distance < best.distance:
+                best = Clearance(distance, self.pairs[pair], sample)
+            column[sample] = np.inf
+            heapq.heappush(queue, (float(column.min()), pair))
+        return best
+
+    def _measure(self, sample: int, pair: int, column: FloatArray) -> float:
+        """Distance of a pair at a sample [m]; raises the pair's bounds, also those of a query (n,)."""
+        place = self._rotations[sample], self._translations[sample]
+        distance = float(self._proximity._measure([pair], *place, -np.inf)[0][0])
+        if pair not in self._paths:
+            self._paths[pair] = self._bounds.path(pair, self._rotations, self._translations)
+        # Far from the sample the shape has moved too much for the bound to say anything.
+        near = slice(max(0, sample - WINDOW), sample + WINDOW + 1)
+        steps = self._paths[pair][near] - self._paths[pair][sample]
+        bound = distance - np.sqrt(np.einsum("nci,nci->nc", steps, steps).max(axis=1))
+        for bounds in (column, self._lower[:, pair]):
+            np.maximum(bounds[near], bound, out=bounds[near])
+        self._lower[sample, pair], self._measured[sample, pair] = distance, True
+        return distance
 
 
 def _split(placements: FloatArray) -> tuple[FloatArray, FloatArray]:

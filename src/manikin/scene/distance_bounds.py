@@ -140,20 +140,18 @@ class PairBounds:
         apart = segment_distances(centre, a, other_centre, b) - radius - other_radius
         lower[sample, pair] = apart - _NEARLY_PARALLEL
 
-    def displacement(
-        self, pair: int, sample: int, rotations: FloatArray, translations: FloatArray
-    ) -> FloatArray:
-        """(n,) how far the pair's shape has moved, relative to the other, since ``sample`` [m].
+    def path(self, pair: int, rotations: FloatArray, translations: FloatArray) -> FloatArray:
+        """(n, 8, 3) corners of the box around the pair's first shape, as the second one sees them [m].
 
-        The distance of the pair differs from that at ``sample`` by no more. A rigid displacement is largest
-        at a corner of the box around the shape, because its length is convex in the point.
+        The pair's distance changes by no more than the corners move. A rigid displacement is largest at a
+        corner of the box around the shape, because its length is convex in the point.
         """
         shape, other = self.first[pair], self.second[pair]
         corners = self._corners[shape] @ np.swapaxes(rotations[:, shape], -1, -2)
         corners = corners + translations[:, shape, None]
         if other < self._count:
             corners = (corners - translations[:, other, None]) @ rotations[:, other]
-        return np.sqrt(((corners - corners[sample]) ** 2).sum(axis=2).max(axis=1))
+        return np.asarray(corners)
 
     def _to_parts(self, centres: FloatArray) -> FloatArray:
         """(n, shapes, parts): least over the spheres of the distance to the part's own box."""

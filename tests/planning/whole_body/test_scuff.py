@@ -17,7 +17,9 @@ def measure(person, flat_ground):
 
     def depth_and_time(motion, schedule, more=frozenset()):
         ignored = ignored_pairs(person, flat_ground, schedule, motion.time)
-        return deepest_penetration(person, proximity, schedule, motion, [pairs | more for pairs in ignored])
+        return deepest_penetration(
+            person, proximity.along(motion.q), schedule, motion.time, [pairs | more for pairs in ignored]
+        )
 
     return depth_and_time
 

@@ -24,7 +24,7 @@ from manikin.planning.whole_body.refine_measures import RefineObstacles
 from manikin.planning.whole_body.sliding_touchdown import Ignored, SlidingTouchdown, sliding_touchdown_errors
 from manikin.runtime.requirement import Requirement, RequirementTable, Sense, requirement_table
 from manikin.scene import Proximity
-from manikin.scene.distance import segment_of
+from manikin.scene.distance import MotionDistances, segment_of
 
 
 @dataclass(frozen=True)
@@ -207,17 +207,18 @@ def certify(
         meeting: What is met at speed, at the motion's samples.
         polytopes: Of the phases, where they are known.
     """
-    schedule = trajectory.schedule
+    schedule, distances = trajectory.schedule, proximity.along(motion.q)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
     series = {
         "max_com_error_m": np.where(trajectory.binds(motion.time), com, 0.0),
         "max_meeting_error_m": sliding_touchdown_errors(proximity, meeting, motion),
         "max_missing_wrench": np.linalg.norm(motion.tau[:, :6], axis=1),
     }
-    worst = {"max_scuff_m": (*deepest_penetration(body, proximity, schedule, motion, ignored), "")}
+    scuff = deepest_penetration(body, distances, schedule, motion.time, ignored)
+    worst = {"max_scuff_m": (*scuff, "")}
     stances, phases = [phase.stance for phase in schedule.sequence], schedule.phase_at(motion.time)
     return _certificate(
-        body, proximity, schedule, motion, ignored, series, worst,
+        body, distances, schedule, motion, ignored, series, worst,
         motion_margin(stances, phases, wrench, motion.com, polytopes=polytopes),
         requirements or WholeBodyRequirements(),
     )  # fmt: skip
@@ -238,7 +239,8 @@ def certify_refined(
     without = np.array(flat)[schedule.phase_at(motion.time)]
     margin = np.where(without, np.inf, motion.margin)
     lowest = int(np.argmin(margin))
-    flying = proximity.minimum_over(motion.q, obstacles.touching(), tolerance=1e-5)
+    distances = proximity.along(motion.q)
+    flying = distances.minimum(obstacles.touching(), tolerance=1e-5)
     worst = {
         "min_margin": (float(margin[lowest]), float(motion.time[lowest]), ""),
         "max_penetration_m": (
@@ -248,14 +250,14 @@ def certify_refined(
         ),
     }
     return _certificate(
-        body, proximity, schedule, motion, obstacles.during_flights(), {"max_physics_violation": violation},
+        body, distances, schedule, motion, obstacles.during_flights(), {"max_physics_violation": violation},
         worst, replace(balance, force=np.where(without, np.inf, balance.force)),
         requirements or RefineRequirements(),
     )  # fmt: skip
 
 
 def _certificate(
-    body: BodyModel, proximity: Proximity, schedule: ContactSchedule, motion: Motion,
+    body: BodyModel, distances: MotionDistances, schedule: ContactSchedule, motion: Motion,
     ignored: tuple[Ignored, ...], series: Mapping[str, FloatArray],
     worst: dict[str, tuple[float, float, str]], balance: MotionMargin, requirements: WholeBodyRequirements,
 ) -> MotionCertificate:  # fmt: skip
@@ -277,7 +279,7 @@ def _certificate(
             continue
         sample, column = divmod(int(np.argmax(values)), len(names))
         worst[key] = float(values[sample, column]), float(motion.time[sample]), names[column]
-    closest = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
+    closest = distances.minimum(ignored, tolerance=1e-5)
     pair = closest.pair or ("", "")
     when = float(motion.time[closest.sample])
     worst["min_clearance_m"] = float(closest.distance), when, " and ".join(pair)
@@ -395,31 +397,32 @@ def _errors(body: BodyModel, contact: Contact, own: _Poses, carrier: _Poses) -> 
 
 
 def deepest_penetration(
-    body: BodyModel, proximity: Proximity, schedule: ContactSchedule, motion: Motion,
+    body: BodyModel, distances: MotionDistances, schedule: ContactSchedule, time: FloatArray,
     ignored: Sequence[Ignored],
 ) -> tuple[float, float]:  # fmt: skip
     """Largest depth of a flight [m], zero where nothing goes in, and its time [s].
 
     Args:
+        distances: Along the motion, at times (n,) [s].
         ignored: Pairs of segment and obstacle that may touch, per sample; what every segment may
             touch is padded, and not measured.
     """
-    deepest, worst = 0.0, float(motion.time[0])
+    deepest, worst = 0.0, float(time[0])
     for swing in schedule.sequence.swings():
         start, end = schedule.swing_interval(swing)
-        rows = np.flatnonzero((motion.time >= start) & (motion.time < end))
+        rows = np.flatnonzero((time >= start) & (time < end))
         ends = {segment for segment, _ in touching_pairs(body, [(swing.effector, "")])}
         # What the segments may touch at some time, that apart which every segment may touch.
-        pairs = frozenset[tuple[str, str]]().union(*(ignored[row] for row in rows.tolist()))
-        near = {obstacle for segment, obstacle in pairs if segment in ends}
-        obstacles = {one for one in near if any((other.name, one) not in pairs for other in body.segments)}
+        touching = frozenset[tuple[str, str]]().union(*(ignored[row] for row in rows.tolist()))
+        near = {obstacle for segment, obstacle in touching if segment in ends}
+        obstacles = {one for one in near if any((other.name, one) not in touching for other in body.segments)}
         if not obstacles or not len(rows):
             continue
         others = frozenset(
-            (shape, other) for shape, other in proximity.pairs
+            (shape, other) for shape, other in distances.pairs
             if segment_of(shape) not in ends or segment_of(other) not in obstacles
         )  # fmt: skip
-        found = proximity.minimum_over(motion.q[rows], others, tolerance=1e-5)
+        found = distances.minimum(others, tolerance=1e-5, rows=rows)
         if -found.distance > deepest:
-            deepest, worst = -float(found.distance), float(motion.time[rows[found.sample]])
+            deepest, worst = -float(found.distance), float(time[found.sample])
     return deepest, worst

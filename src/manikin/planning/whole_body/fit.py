@@ -33,9 +33,10 @@ HELD, AT_REST = 1.0e15, 3
 """Damping of control points that stay, and their number at an end at rest in a given posture: velocity and
 acceleration are zero there."""
 
-FURTHER_DECREASE, SPARED = 3.0e-4, 0.1
+FURTHER_DECREASE, SPARED, EASED = 3.0e-4, 0.1, 0.01
 """Relative decrease of the objective below which constrained steps stop where the strength is exceeded, a
-small part of the objective; and share of the strength beyond the wanted one from which it counts as that."""
+small part of the objective; share of the strength beyond the wanted one from which it counts as that; and the
+part of this excess that a step has to take away."""
 
 SHARINGS, FALLING, BEYOND = 3, 0.7, 2.0
 """How often the contact forces are shared at most for the strength, the share of the excess before that is
@@ -148,7 +149,7 @@ class MotionFit:
         and what is left of their errors is of second order in the step. The whole step sets the damping, also
         where only a part of it is taken: where it made the objective greater, the next one is shorter.
         They stop after one that hardly makes it less, or after :data:`VAIN` in a row where only parts of
-        steps help or the strength is exceeded.
+        steps help or the strength is exceeded, and hardly less from step to step.
         """
         taken = vain = 0
         while taken < scales.constrained_steps and vain < VAIN:
@@ -175,9 +176,10 @@ class MotionFit:
                 continue
             # The squared multipliers in the augmented objective say nothing of the motion.
             decrease = (current.cost - trial.cost) / (current.cost - 0.5 * float(np.sum(after**2)))
-            points, current, self._multiplier = trial_points, trial, after
             strong = trial.excess is not None and trial.excess >= SPARED
-            slight = decrease < (FURTHER_DECREASE if strong else scales.constrained_decrease)
+            eased = strong and (trial.excess or 0.0) < (1.0 - EASED) * (current.excess or np.inf)
+            slight = decrease < (FURTHER_DECREASE if eased else scales.constrained_decrease)
+            points, current, self._multiplier = trial_points, trial, after
             vain = vain + 1 if slight else 0
             if slight and not strong and length == 1.0:
                 break

@@ -47,8 +47,8 @@ SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09,
 CLOSEST_KNOTS = 4.0e-3
 """Knots closer than this are one [s]."""
 
-Places = tuple[float, ...]
-"""Instants as phases with the share of them that is over: they stay where phases last longer."""
+Places = tuple[tuple[float, ...], ...]
+"""Groups of instants as phases with the share of them that is over: they stay where phases last longer."""
 
 S = TypeVar("S", bound=MotionScales)
 
@@ -90,7 +90,7 @@ class FitAttempt(Generic[G]):
     """One fit with its measured motion.
 
     Attributes:
-        fine: Where the knots were doubled, once for each place and near the key instants as well.
+        fine: Where the knots were doubled, once for each group of places.
         continued: Whether it went on from an earlier spline.
         fit: The solver, with its multipliers and damping.
         certificate: Measured on them, beside its limits.
@@ -134,13 +134,24 @@ class FitAttempt(Generic[G]):
         seen = self.fit.clearance_beside(self.result.spline, worst.time_s)
         return CLEARANCE if seen - worst.measured > DIP else frozenset()
 
+    @property
+    def is_fine(self) -> bool:
+        """Whether the knots near all key instants were doubled."""
+        return any(len(places) > 1 for places in self.fine)
+
     def finer(self, keys: Collection[str]) -> Places:
-        """:attr:`fine` with the place where most is missed of some requirements that are broken."""
+        """:attr:`fine` with the place where most is missed of some requirements that are broken.
+
+        Once, where it is not the clearance, with the key instants: what is missed there shows in the phases
+        beside them, too. More knots where nothing is missed cost time and change nothing.
+        """
         worst = self.certificate.worst(keys)
         if worst is None:
             return self.fine
         instants = self.goal.schedule.instants
-        return (*self.fine, float(np.interp(worst.time_s or 0.0, instants, np.arange(len(instants)))))
+        numbers = np.arange(len(instants), dtype=np.float64)
+        whole = () if worst.key in CLEARANCE or self.is_fine else tuple(numbers.tolist())
+        return (*self.fine, (*whole, float(np.interp(worst.time_s or 0.0, instants, numbers))))
 
     def is_stuck_after(self, before: "FitAttempt[G]") -> bool:
         """Whether what the attempt before missed most is missed as much again: the fit is at a minimum."""
@@ -188,13 +199,13 @@ class FitJob:
     iterations: int = 0
 
     def knots(self, schedule: ContactSchedule, fine: Places = ()) -> FloatArray:
-        """Clamped knots [s] for contacts in time, doubled near some places, see :class:`FitAttempt`."""
+        """Clamped knots [s] for contacts in time, doubled near places, see :attr:`FitAttempt.fine`."""
         sudden = touch_downs_at_speed(schedule) if self.sudden else ()
         first, last = self.span or (0, len(schedule.sequence))
         instants = schedule.instants[first : last + 1]
         knots = phase_knots(instants, self.knot_spacing, sudden)
-        for when in np.interp(fine, np.arange(len(schedule.instants)), schedule.instants):
-            knots = refined(knots, np.append(instants, when))
+        for places in fine:
+            knots = refined(knots, np.interp(places, np.arange(len(schedule.instants)), schedule.instants))
         return knots
 
     def samples(self, knots: FloatArray) -> tuple[FloatArray, SampledBasis]:

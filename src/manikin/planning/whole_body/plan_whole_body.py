@@ -404,7 +404,7 @@ class _Planner:
         goal, broken = last.goal, last.broken
         if last.is_caught:  # Fits that follow may have the finer knots again.
             return replace(self.job.restart(last), fine=last.fine)
-        if last.fine and broken & INEXACT:
+        if last.is_fine and broken & INEXACT:
             return None
         exact, weak = INEXACT | last.unsampled, "max_torque_share" in broken
         if weak:  # where a contact made at speed still settles, only the momentum decides the torques

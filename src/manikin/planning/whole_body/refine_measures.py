@@ -248,8 +248,9 @@ def measure(
     margin, violation = balance_of(schedule, rooms, time, found.wrench, found.com)
     error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
     outside = np.maximum(body.lower - q[:, 7:], q[:, 7:] - body.upper).max()
-    clearance = proximity.minimum_over(q, obstacles.during_flights(), tolerance=1e-5)
-    flying = proximity.minimum_over(q, obstacles.touching(), tolerance=1e-5)
+    distances = proximity.along(q)
+    clearance = distances.minimum(obstacles.during_flights(), tolerance=1e-5)
+    flying = distances.minimum(obstacles.touching(), tolerance=1e-5)
     return RefineMeasures(
         duration_s=float(time[-1] - time[0]),
         squared_accelerations=step * float(np.sum(a[:, 6:] ** 2)),
