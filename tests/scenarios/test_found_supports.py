@@ -102,7 +102,11 @@ def test_a_body_that_bends_below_a_bar_walks(way):
         rooms = (phase.com_below.position - np.array(ends)) @ normal
         assert 0.0 <= rooms.min() < 0.031  # the postures are below it, and the higher one is just below
         higher = ends[int(rooms.argmin())]
-        assert min(float(region.violation(higher)) for region in parts) <= 1e-9
+        stances = [phase.stance for phase in problem.sequence][begins[number] : begins[number + 1]]
+        whole = [all(contact.part is SolePart.FULL for contact in stance) for stance in stances]
+        missed = [float(region.violation(higher)) for region in parts]
+        # The posture has flat soles: parts on heel or toes miss it by a little.
+        assert all(miss <= (1e-9 if flat else 0.02) for miss, flat in zip(missed, whole, strict=True))
         above = higher + np.array([0.0, 0.0, 0.1])
         assert min(float(region.violation(above)) for region in parts) > 0.03
     result = plan_com(problem, guesses=1)
@@ -153,6 +157,30 @@ def test_a_walk_that_fails_has_more_time_then_rests_there_then_everywhere(paced)
     assert everywhere.passing is None
     fail()
     assert slower(everywhere, report, at) is None
+
+
+def test_a_walk_below_a_bar_that_fails_is_tried_on_flat_feet_first(way, monkeypatch):
+    """At the same pace and without rests; after that it has more time, as any walk."""
+    context, found = way(0.0, goal=2.0, scene=BAR)
+    report = Report(context, None, None, time.perf_counter())
+    monkeypatch.setattr(contact_stage, "find_supports", lambda *_: found)
+    walking = plan_contacts(context, report)
+    assert walking.scenario.file.supports.foot == "rolling"
+    assert walking.scenario.file.manner == "walking"  # the way is level
+
+    def fail():
+        report.summary["wholebody"] = {}
+        report.fail("wholebody", "left_forearm comes too near to the bar", 1.0, "phase 2")
+
+    fail()
+    flat = slower(walking, report, 3)
+    assert flat.scenario.file.supports.foot is None
+    assert flat.passing.paces == walking.passing.paces
+    assert not rests(flat)
+    fail()
+    slow = slower(flat, report, 3)
+    assert slow.scenario.file.supports.foot is None
+    assert slow.passing.paces != flat.passing.paces
 
 
 def test_the_pace_of_a_task_stretches_all_phases_on_feet(way):

@@ -1,3 +1,4 @@
+import itertools
 from types import SimpleNamespace
 
 import coal
@@ -365,6 +366,55 @@ def test_the_minimum_over_samples_is_the_least_of_each(person, near, lift):
     found = near.minimum_over(samples)
     assert found.distance == pytest.approx(min(each), abs=1e-6)
     assert each[found.sample] == pytest.approx(found.distance, abs=1e-6)
+
+
+def test_what_one_query_along_a_motion_measures_changes_no_later_one(person, near):
+    """Each of several queries, over all samples or some, is answered as if it were the only one."""
+    rng = np.random.default_rng(4)
+    ends = np.array([wander(person, rng, 0.2) for _ in range(4)])
+    samples = np.concatenate([np.linspace(a, b, 12) for a, b in itertools.pairwise(ends)])
+    samples[:, 3:7] /= np.linalg.norm(samples[:, 3:7], axis=1, keepdims=True)
+    first = near.minimum_over(samples).pair
+    queries = [
+        (frozenset[tuple[str, str]](), None), (frozenset({first}), None),
+        (frozenset({first}), np.arange(5, 20)), (frozenset[tuple[str, str]](), np.arange(20, 36)),
+    ]  # fmt: skip
+    motion = near.along(samples)
+    for ignored, rows in queries:
+        found = motion.minimum(ignored, rows=rows)
+        chosen = np.arange(len(samples)) if rows is None else rows
+        alone = near.minimum_over(samples[chosen], ignored)
+        assert found.distance == pytest.approx(alone.distance, abs=2e-6)  # each is exact to a micrometre
+        assert found.sample in chosen
+        assert near.minimum(samples[found.sample], ignored).distance == found.distance
+
+
+def tub():
+    """An open mesh: a box of 0.6 x 0.4 x 0.3 m without a lid, on the ground."""
+    corners = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (-0.2, 0.2) for z in (0.0, 0.3)])
+    faces = [
+        [0, 2, 6], [0, 6, 4], [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+        [2, 3, 7], [2, 7, 6],
+    ]  # fmt: skip
+    return Obstacle("tub", Mesh(corners, np.array(faces)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_depths_that_jump_along_a_motion_are_found_as_each_alone(person, seed):
+    """Through an open mesh, whose depth is that of the worst triangle, no bound says more than is true."""
+    near, rng = Proximity(person, Scene([tub()]), self_collision=False), np.random.default_rng(seed)
+    start, end = (wander(person, rng, 0.5) for _ in range(2))
+    samples = np.array([pin.interpolate(person.pinocchio, start, end, s) for s in np.linspace(0.0, 1.0, 40)])
+    each = np.array([near.minimum(q).distance for q in samples])
+    motion = near.along(samples)
+    for row in rng.permutation(len(samples)):
+        assert motion.minimum(rows=np.array([row])).distance == pytest.approx(each[row], abs=1e-6)
+    assert motion.minimum().distance == pytest.approx(each.min(), abs=1e-6)
+    assert near.minimum_over(samples).distance == pytest.approx(each.min(), abs=1e-6)
+
+
+def test_a_motion_without_samples_has_endless_room(person, near):
+    assert near.minimum_over(np.zeros((0, person.nq))).distance == np.inf
 
 
 def test_ignored_pairs_are_left_out_in_either_order_and_per_sample(person, near):

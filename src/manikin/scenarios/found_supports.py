@@ -142,7 +142,7 @@ def without_rests(
 
     Args:
         paces: One for each stage of the plan; as fast as people step when omitted.
-        rolls: Whether feet may roll over heels and toes.
+        rolls: Whether feet roll over heels and toes.
     """
     rise = len(rising_times(plan.stages))
     # The last stage before a seat leads to its touch.

@@ -15,13 +15,13 @@ from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
 from manikin.scene.collision import Measured, Meter, collision_parts, pair_meter, part_meter
 from manikin.scene.distance_bounds import (
-    IntArray,
     KnownDistances,
     PairBounds,
     PlacedShapes,
     PlacementReader,
 )
 from manikin.scene.scene import Scene
+from manikin.scene.triangles import IntArray
 
 Pair = tuple[str, str]
 Ignored = frozenset[Pair]
@@ -35,6 +35,8 @@ WORTHWHILE = 20
 """Pairs that may be near, more than before, from which on a broad phase costs less than measuring them."""
 WINDOW = 200
 """Neighbouring samples whose lower bounds one measured distance raises."""
+KEPT_PATHS = 64
+"""Paths of pairs that are kept along a motion; of 2000 samples they take 25 MB."""
 
 
 class BodyGeometry(Protocol):
@@ -177,6 +179,8 @@ class Proximity(BodyPairs):
             for number, part in enumerate(parts)
         }
         self._moving = [coal.Transform3s() for _ in range(self._count)]
+        meshes = [isinstance(part.geometry, coal.BVHModelBase) for part in parts]
+        self._jumps = [other >= self._count and meshes[other - self._count] for other in self._second]
         self._known, self._last_near = KnownDistances(), 0
 
     def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
@@ -363,7 +367,8 @@ class MotionDistances:
     """Smallest distances along a motion. What one query measures, the next ones know.
 
     Every (sample, pair) has a lower bound, from covering spheres at first; measuring one of them raises the
-    bounds of its pair at other samples, because a distance changes no faster than the shape moves.
+    bounds of its pair at other samples, because a distance changes no faster than the shape moves. The depth
+    in a mesh that is not convex may jump: it raises none. Measures with the buffers of its ``proximity``.
 
     Attributes:
         pairs: (body shape, obstacle or other body shape) of every pair.
@@ -373,67 +378,75 @@ class MotionDistances:
 
     def __init__(self, proximity: Proximity, q_samples: FloatArray) -> None:
         self._proximity, self._bounds, self.pairs = proximity, proximity._bounds, proximity.pairs
-        samples = [checked_configuration(proximity._model, q) for q in q_samples]
-        self._rotations, self._translations = _split(
-            np.array([proximity._placements_at(q) for q in samples]).reshape(len(samples), -1, 4, 4)
-        )
+        placements = np.empty((len(q_samples), proximity._count, 4, 4))
+        for sample, q in enumerate(q_samples):
+            placements[sample] = proximity._placements_at(checked_configuration(proximity._model, q))
+        self._rotations, self._translations = _split(placements)
         lower = self._bounds.lower(self._rotations, self._translations)
         self._lower = np.where(lower > 0.0, lower, -np.inf)
         self._measured = np.zeros(lower.shape, dtype=np.bool_)
         self._paths: dict[int, FloatArray] = {}
 
     def minimum(
-        self,
-        ignore: Ignored | Sequence[Ignored] = NOTHING,
-        tolerance: float = 1e-6,
+        self, ignore: Ignored | Sequence[Ignored] = NOTHING, tolerance: float = 1e-6,
         rows: IntArray | None = None,
-    ) -> Clearance:
+    ) -> Clearance:  # fmt: skip
         """Smallest signed distance, exact to ``tolerance`` [m], at all samples or at ``rows`` (k,) of them.
 
-        Only what could still be the minimum is measured, best first. The sample is one of the motion's.
+        Only what could still be the minimum is measured, best first.
+
+        Args:
+            ignore: As for :meth:`Proximity.evaluate_over`, one set for each of all samples where many.
+
+        Returns:
+            With the number of the sample in the whole motion.
         """
         considered = self._proximity._considered_over(ignore, len(self._lower))
-        if rows is not None:
-            chosen = np.zeros((len(considered), 1), dtype=np.bool_)
-            chosen[rows] = True
-            considered = considered & chosen
-        known = np.where(considered & self._measured, self._lower, np.inf)
-        best = Clearance(np.inf, None)
+        samples = np.arange(len(self._lower)) if rows is None else np.asarray(rows, dtype=np.int64)
+        considered, measured = considered[samples], self._measured[samples]
+        lower, best = np.where(considered, self._lower[samples], np.inf), Clearance(np.inf, None)
+        known = np.where(measured, lower, np.inf)
         if np.isfinite(known).any():
-            sample, pair = divmod(int(np.argmin(known)), known.shape[1])
-            best = Clearance(float(known[sample, pair]), self.pairs[pair], sample)
-        lower = np.where(considered & ~self._measured, self._lower, np.inf)
-        queue = [
-            (float(bound), pair)
-            for pair, bound in enumerate(lower.min(axis=0, initial=np.inf))
-            if bound < np.inf
-        ]
+            row, pair = divmod(int(np.argmin(known)), known.shape[1])
+            best = Clearance(float(known[row, pair]), self.pairs[pair], int(samples[row]))
+        lower[measured] = np.inf
+        least = lower.min(axis=0, initial=np.inf).tolist()
+        queue = [(bound, pair) for pair, bound in enumerate(least) if bound < np.inf]
         heapq.heapify(queue)
         while queue and queue[0][0] < best.distance - tolerance:
             _, pair = heapq.heappop(queue)
             column = lower[:, pair]
-            sample = int(np.argmin(column))
-            distance = self._measure(sample, pair, column)
+            row = int(np.argmin(column))
+            sample = int(samples[row])
+            distance = self._measure(sample, pair)
             if distance < best.distance:
                 best = Clearance(distance, self.pairs[pair], sample)
-            column[sample] = np.inf
+            np.maximum(column, self._lower[samples, pair], out=column)
+            column[row] = np.inf
             heapq.heappush(queue, (float(column.min()), pair))
         return best
 
-    def _measure(self, sample: int, pair: int, column: FloatArray) -> float:
-        """Distance of a pair at a sample [m]; raises the pair's bounds, also those of a query (n,)."""
+    def _measure(self, sample: int, pair: int) -> float:
+        """Distance of a pair at a sample [m]; raises the bounds of the pair."""
         place = self._rotations[sample], self._translations[sample]
         distance = float(self._proximity._measure([pair], *place, -np.inf)[0][0])
-        if pair not in self._paths:
-            self._paths[pair] = self._bounds.path(pair, self._rotations, self._translations)
-        # Far from the sample the shape has moved too much for the bound to say anything.
-        near = slice(max(0, sample - WINDOW), sample + WINDOW + 1)
-        steps = self._paths[pair][near] - self._paths[pair][sample]
-        bound = distance - np.sqrt(np.einsum("nci,nci->nc", steps, steps).max(axis=1))
-        for bounds in (column, self._lower[:, pair]):
-            np.maximum(bounds[near], bound, out=bounds[near])
+        if distance >= 0.0 or not self._proximity._jumps[pair]:
+            # Far from the sample the shape has moved too much for the bound to say anything.
+            near = slice(max(0, sample - WINDOW), sample + WINDOW + 1)
+            path = self._path(pair)
+            steps = path[near] - path[sample]
+            bound = distance - np.sqrt(np.einsum("nci,nci->nc", steps, steps).max(axis=1))
+            lower = self._lower[near, pair]
+            np.maximum(lower, bound, out=lower, where=~self._measured[near, pair])
         self._lower[sample, pair], self._measured[sample, pair] = distance, True
         return distance
+
+    def _path(self, pair: int) -> FloatArray:
+        if pair not in self._paths:
+            if len(self._paths) >= KEPT_PATHS:
+                self._paths.clear()
+            self._paths[pair] = self._bounds.path(pair, self._rotations, self._translations)
+        return self._paths[pair]
 
 
 def _split(placements: FloatArray) -> tuple[FloatArray, FloatArray]:

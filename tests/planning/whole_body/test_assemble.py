@@ -22,6 +22,7 @@ from manikin.planning.whole_body import (
     swing_planner,
 )
 from manikin.planning.whole_body.certificate import support_errors
+from manikin.planning.whole_body.fit import is_eased
 from manikin.planning.whole_body.fit_job import (
     CLOSEST_KNOTS,
     FitAttempt,
@@ -388,6 +389,14 @@ def test_refined_knots_keep_the_old_ones_and_halve_the_spans_at_key_instants(dur
     assert np.all(np.diff(np.unique(fine))[near] <= max(0.5 * widest, 2.0 * CLOSEST_KNOTS) + 1e-9)
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "eased"),
+    [(0.4, 0.3, True), (0.4, 0.3999, False), (0.0, 0.2, False), (None, 0.2, False)],
+)
+def test_a_step_is_worth_its_time_that_takes_away_some_of_the_excess(before, after, eased):
+    assert is_eased(before, after) is eased
+
+
 def test_what_is_broken_weighs_more():
     """Scales of the broken requirements become finer, the others stay."""
     scales, job = FitScales(), FitJob(0.05, penalties=MODULE.PENALTIES, patience=0.005)
@@ -428,6 +437,10 @@ def test_knots_are_doubled_where_a_contact_is_missed_also_far_from_key_instants(
     )
     assert np.abs(schedule.instants - 0.6).min() > 0.1
     assert attempt.finer({"max_com_error_m"}) == ()
+    assert replace(attempt, fine=fine).is_fine
+    assert not replace(attempt, fine=((0.3,), (1.2,))).is_fine
+    worse = blocked(attempt, "min_clearance_m", -0.05)  # a clearance that is missed more hides no contact
+    assert replace(worse, fine=worse.finer({"max_support_error_m", "min_clearance_m"})).is_fine
     for slower in (1.0, 1.5):
         later = ContactSchedule(schedule.sequence, slower * schedule.instants)
         plain, dense = (np.unique(job.knots(later, places)) for places in ((), fine))
@@ -448,4 +461,11 @@ def test_a_clearance_that_is_missed_between_samples_asks_for_more_of_them(step_a
     rows = tuple(row if item.key == row.key else item for item in step_attempt.certificate)
     attempt = replace(step_attempt, certificate=replace(step_attempt.certificate, rows=rows))
     assert bool(attempt.unsampled) == unsampled
-    assert len(attempt.finer(attempt.unsampled)) == unsampled
+    fine = attempt.finer(attempt.unsampled)
+    assert len(fine) == unsampled
+    # Knots are doubled there alone: near key instants that are far from it, nothing is missed.
+    job, schedule = FitJob(0.1), attempt.goal.schedule
+    plain, dense = (np.unique(job.knots(schedule, places)) for places in ((), fine))
+    more = np.setdiff1d(dense, plain)
+    assert bool(len(more)) == unsampled
+    assert np.all(np.abs(more - time) < 0.15)

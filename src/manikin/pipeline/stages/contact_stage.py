@@ -411,6 +411,7 @@ def _passed(report: Report, context: RunContext, passing: Passing) -> RunContext
 def slower(context: RunContext, report: Report, stage: int | None) -> RunContext | None:
     """The walk after a failure: with more time, then with rests around the stage of it, then everywhere.
 
+    A body that bends below something, on feet that roll, walks on flat ones first.
     A plan of the centre of mass that fails has rests there at once, and one that fails again somewhere else
     has them there, too, up to :data:`RESTED` of the stages. A posture that is missing on feet that roll is
     sought on flat ones before. None where the body rests at all changes, and after a success.
@@ -421,6 +422,10 @@ def slower(context: RunContext, report: Report, stage: int | None) -> RunContext
     unplanned, moved = failure.stage == "centroidal", report.summary["wholebody"] is not None
     report.try_again()
     paces, walking = passing.paces, None
+    if passing.rolls and _bends(context):
+        walking = _passed(report, context, replace(passing, rolls=False))
+        if walking is not None:
+            return walking
     if moved and Pace.PASSING in paces:
         paces = tuple(max(pace, Pace.UNHURRIED) for pace in paces)
     elif stage is not None and (
@@ -436,6 +441,12 @@ def slower(context: RunContext, report: Report, stage: int | None) -> RunContext
     if walking is None:
         report.keep_scenario(passing.resting.scenario)
     return walking or passing.resting
+
+
+def _bends(context: RunContext) -> bool:
+    """Whether the body bends below something on its way."""
+    supports = context.scenario.file.supports
+    return supports is not None and any(phase.com_below is not None for phase in supports.phases)
 
 
 def plan_contacts_again(context: RunContext, report: Report, phase: int) -> RunContext | None:

@@ -115,7 +115,7 @@ class Passing:
         asked: The scenario before supports were found.
         resting: The task with rests at all changes.
         paces: Of the stages of the contact plan.
-        rolls: Whether its feet may roll over heels and toes.
+        rolls: Whether its feet roll over heels and toes.
     """
 
     asked: Scenario

@@ -177,7 +177,7 @@ class MotionFit:
             # The squared multipliers in the augmented objective say nothing of the motion.
             decrease = (current.cost - trial.cost) / (current.cost - 0.5 * float(np.sum(after**2)))
             strong = trial.excess is not None and trial.excess >= SPARED
-            eased = strong and (trial.excess or 0.0) < (1.0 - EASED) * (current.excess or np.inf)
+            eased = strong and is_eased(current.excess, trial.excess)
             slight = decrease < (FURTHER_DECREASE if eased else scales.constrained_decrease)
             points, current, self._multiplier = trial_points, trial, after
             vain = vain + 1 if slight else 0
@@ -250,6 +250,11 @@ class MotionFit:
         else:
             factor = np.where(new > old, MORE, 1.0)
         self._damping = np.clip(self._damping * factor, LEAST_DAMPING, MOST_DAMPING)
+
+
+def is_eased(before: float | None, after: float | None) -> bool:
+    """Whether a step takes away a part of the excess of strength that is worth it."""
+    return before is not None and after is not None and after < (1.0 - EASED) * before
 
 
 def spline_through(configurations: FloatArray, basis: SampledBasis, knots: FloatArray) -> ConfigurationSpline:

@@ -137,21 +137,25 @@ class FitAttempt(Generic[G]):
     @property
     def is_fine(self) -> bool:
         """Whether the knots near all key instants were doubled."""
-        return any(len(places) > 1 for places in self.fine)
+        return any(len(places) >= len(self.goal.schedule.instants) for places in self.fine)
 
     def finer(self, keys: Collection[str]) -> Places:
-        """:attr:`fine` with the place where most is missed of some requirements that are broken.
+        """:attr:`fine` with the places where most is missed of some requirements that are broken.
 
-        Once, where it is not the clearance, with the key instants: what is missed there shows in the phases
-        beside them, too. More knots where nothing is missed cost time and change nothing.
+        The first time that something else than the clearance is missed, the key instants are added. More
+        knots where nothing is missed cost time and change nothing.
         """
-        worst = self.certificate.worst(keys)
-        if worst is None:
+        others = self.certificate.worst(frozenset(keys) - CLEARANCE)
+        found = [
+            row for row in (others, self.certificate.worst(CLEARANCE & frozenset(keys))) if row is not None
+        ]
+        if not found:
             return self.fine
         instants = self.goal.schedule.instants
         numbers = np.arange(len(instants), dtype=np.float64)
-        whole = () if worst.key in CLEARANCE or self.is_fine else tuple(numbers.tolist())
-        return (*self.fine, (*whole, float(np.interp(worst.time_s or 0.0, instants, numbers))))
+        whole = () if others is None or self.is_fine else tuple(numbers.tolist())
+        places = np.interp([row.time_s or 0.0 for row in found], instants, numbers)
+        return (*self.fine, (*whole, *places.tolist()))
 
     def is_stuck_after(self, before: "FitAttempt[G]") -> bool:
         """Whether what the attempt before missed most is missed as much again: the fit is at a minimum."""
@@ -329,10 +333,12 @@ def split_spans(breaks: FloatArray, spacing: float) -> FloatArray:
 
 
 def refined(knots: FloatArray, instants: FloatArray, within: float = 0.1) -> FloatArray:
-    """Clamped knots [s] with every span split in two whose middle is near a key instant, ``within`` [s]."""
+    """Clamped knots [s] with every span split in two that has an instant or is ``within`` [s] of one."""
     breaks = np.unique(knots)
     middle = 0.5 * (breaks[:-1] + breaks[1:])
-    near = np.abs(middle[:, None] - instants).min(axis=1) < within
+    near = (np.abs(middle[:, None] - instants) < np.maximum(within, 0.51 * np.diff(breaks))[:, None]).any(
+        axis=1
+    )
     inner = np.sort(np.concatenate([breaks, middle[near & (np.diff(breaks) > 2.0 * CLOSEST_KNOTS)]]))
     return np.concatenate([np.full(DEGREE, breaks[0]), inner, np.full(DEGREE, breaks[-1])])
 

@@ -368,10 +368,11 @@ class Refinement:
         # Weights may find the strength; where they do not, time does.
         waits = weak and number < 2
         slower = number > 0 and self.settings.retime and not waits and bool(broken & _SLOWED.keys())
-        if len(last.fine) == 2 and broken <= _EXACT:  # is out of reach
+        if last.is_fine and len(last.fine) > 1 and broken <= _EXACT:  # is out of reach
             return None
-        # How often the spline's knots near the key instants are doubled at most.
-        fine = last.finer(_EXACT | last.unsampled) if len(last.fine) < 2 else last.fine
+        # Rounds in which knots are doubled: two, or three where the first two are for the clearance.
+        more = len(last.fine) < (2 if last.is_fine else 3)
+        fine = last.finer(_EXACT | last.unsampled) if more else last.fine
         if not slower and fine == last.fine:
             return job.improve(last, scales)
         near = last.result.spline
