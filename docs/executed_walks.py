@@ -60,8 +60,8 @@ its plan and shifts footprints.
 |---|---|---|---|---|---|---|---|
 """
 FAST = """
-At 1.5 m/s the plan itself asks for much more than the strength, and a forefoot that carries alone has no
-margin left: small deviations end such a walk.
+At 1.5 m/s small deviations end a walk. Why is not known: with its loads as planned it asks for more than a
+joint's strength, but so do walks that arrive.
 """
 STEPS = """
 Steps at full speed, beside those of people: step length and cadence of 43 people ($0.559\\,v^{0.523}$ m,
