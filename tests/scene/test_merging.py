@@ -57,6 +57,22 @@ def test_boxes_that_do_not_touch_or_are_not_level_are_surfaces_of_their_own():
             scene.supporting_surface(sole("left_foot", (0.4, 0.2, 0.2), **FOOT), 1e-3)
 
 
+@pytest.mark.parametrize(("thick", "touched"), [(0.01, ("mat", "floor")), (0.03, ("mat",))])
+def test_what_is_close_below_a_surface_is_touched_with_it(thick, touched):
+    """A foot on a mat of 10 mm cannot keep 14 mm from the floor; the floor beside the mat is its own."""
+    scene = Scene([box("mat", (-1, -1, 0), (1, 1, thick)), box("step", (1, -1, 0), (2, 1, 0.005))])
+    surfaces = {surface.obstacles for surface in scene.surfaces_facing(UP, 0.01)}
+    assert surfaces == {("floor",), touched, ("step", "floor")}
+    assert scene.touched_obstacles(sole("left_foot", (0.0, 0.0, thick), **FOOT)) == touched
+
+
+def test_the_ground_below_a_thin_sheet_is_touched_with_it():
+    """An open mesh has no inside, and hides nothing: the floor below it stays a surface."""
+    corners = np.array([[-1, -1, 0.01], [1, -1, 0.01], [1, 1, 0.01], [-1, 1, 0.01]], dtype=float)
+    scene = Scene([Obstacle("sheet", Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]])))])
+    assert scene.touched_obstacles(sole("left_foot", (0.0, 0.0, 0.01), **FOOT)) == ("sheet", "floor")
+
+
 def test_what_a_box_stands_on_is_no_surface_under_it():
     """The floor has a hole, the lower box another; faces that touch each other are gone."""
     scene = Scene([box("low", (0, 0, 0), (1, 1, 0.3)), box("high", (0.2, 0.2, 0.3), (0.6, 0.6, 0.5))])

@@ -6,7 +6,7 @@ Joining and cutting of polygons is that of GEOS (shapely).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -30,6 +30,8 @@ COPLANAR = 1e-3
 """Largest distance of a face from the plane of the surface it is part of, and from the next part [m]."""
 PARALLEL = float(np.cos(np.deg2rad(0.5)))
 """Cosine of the largest angle between the normals of the parts of a surface."""
+BELOW = 0.02
+"""What is as close below a surface cannot be kept clear of by what lies on it, and is touched with it [m]."""
 _ABOVE = 1.05 * COPLANAR  # [m]; what is inside a solid so far above a face is hidden
 
 
@@ -39,7 +41,7 @@ def merged_surfaces(obstacles: Sequence[Obstacle]) -> tuple[Surface, ...]:
     Faces within :data:`COPLANAR` and :data:`PARALLEL` that touch or overlap are one surface, in the plane of
     the largest. Where a box, cylinder, half-space or closed mesh covers a face, the face is cut; balls and
     capsules touch a face in a point or line and cover nothing. A face that is neither joined nor cut is
-    given as it is.
+    given as it is. What lies close below a face, as the floor below a mat, is touched with it.
     """
     faces = [face for item in obstacles for face in faces_of(item)]
     solids = [solid for item in obstacles for solid in _solids(item)]
@@ -49,9 +51,11 @@ def merged_surfaces(obstacles: Sequence[Obstacle]) -> tuple[Surface, ...]:
         members = [faces[number] for number in group]
         corners = np.concatenate([face.polygon for face in members])
         near = np.all(bounds[:, 0] <= corners.max(axis=0) + _ABOVE, axis=1)
-        near &= np.all(bounds[:, 1] >= corners.min(axis=0) - _ABOVE, axis=1)
+        near &= np.all(bounds[:, 1] >= corners.min(axis=0) - BELOW, axis=1)
         around = [solids[number] for number in np.flatnonzero(near).tolist()]
-        found += [(group[first], surface) for first, surface in _joined(members, around)]
+        for first, surface in _joined(members, around):
+            below = _below(surface, [solid for solid in around if solid.name not in surface.obstacles])
+            found.append((group[first], replace(surface, obstacles=(*surface.obstacles, *below))))
     return tuple(surface for _, surface in sorted(found, key=lambda item: item[0]))
 
 
@@ -95,6 +99,20 @@ def _joined(members: Sequence[Surface], solids: "Sequence[_Solid]") -> list[tupl
         else:
             found.append((group[0], members[group[0]]))
     return found
+
+
+def _below(surface: Surface, solids: "Sequence[_Solid]") -> tuple[str, ...]:
+    """Names of the obstacles that are within :data:`BELOW` below a surface."""
+    frame = PlaneFrame.of(surface.normal, surface.polygon)
+    sunk = PlaneFrame(frame.origin - (BELOW + _ABOVE) * surface.normal, frame.rotation)
+    corners = (surface.polygon - frame.origin) @ frame.rotation[:, :2]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    near = [solid for solid in solids if solid.meets(sunk, low, high)]
+    if not near:
+        return ()
+    flat = frame.flat(surface.polygon, surface.holes)
+    found = (solid.name for solid in near if solid.slice(sunk).intersection(flat).area >= SMALLEST_AREA)
+    return tuple(dict.fromkeys(found))
 
 
 def _of_members(
@@ -142,6 +160,7 @@ def _union(shapes: Sequence[Geometry]) -> Geometry:
 class _Solid:
     """A closed body that hides what is inside."""
 
+    name: str  # of its obstacle
     vertices: FloatArray  # (n, 3) in the world [m]
     edges: NDArray[np.int64]  # (e, 2) vertex indices of a convex body's edges
     faces: NDArray[np.int64]  # (m, 3) those of the triangles of one that is not convex, otherwise none
@@ -181,16 +200,16 @@ def _solids(obstacle: Obstacle) -> Iterator[_Solid]:
     none = np.zeros((0, 3), dtype=np.int64)
     if isinstance(shape, HalfSpace):
         normal, offset = obstacle.world_plane
-        yield _Solid(np.zeros((0, 3)), none[:, :2], none, np.array([*normal, offset]))
+        yield _Solid(obstacle.name, np.zeros((0, 3)), none[:, :2], none, np.array([*normal, offset]))
     elif isinstance(shape, (Box, Cylinder)):
         vertices, edges = _prism(shape)
-        yield _Solid(obstacle.to_world(vertices), edges, none)
+        yield _Solid(obstacle.name, obstacle.to_world(vertices), edges, none)
     elif isinstance(shape, Mesh):
         for piece in shape.pieces:
             if piece.closed:
                 vertices = obstacle.to_world(piece.vertices)
                 edges = np.asarray(as_trimesh(piece.vertices, piece.faces).edges_unique)
-                yield _Solid(vertices, edges, none if piece.convex else piece.faces)
+                yield _Solid(obstacle.name, vertices, edges, none if piece.convex else piece.faces)
 
 
 def _prism(shape: Box | Cylinder) -> tuple[FloatArray, NDArray[np.int64]]:

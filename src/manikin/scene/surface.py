@@ -32,7 +32,8 @@ class Surface:
     """A flat polygon of one or more obstacles, seen from its free side.
 
     Attributes:
-        obstacles: Names of the obstacles that it belongs to; coplanar ones that touch are one surface.
+        obstacles: Names of the obstacles that it belongs to; coplanar ones that touch are one surface. After
+            them those close below, which are touched with it.
         polygon: (k, 3) corners in the world [m], counter-clockwise about the normal, perhaps not convex.
         normal: (3,) unit normal, out of the obstacle.
         holes: (h, 3) corners of each hole [m], clockwise about the normal.
