@@ -29,7 +29,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory, RecordedCom
 from manikin.planning.whole_body.certificate import MotionCertificate, certify
 from manikin.planning.whole_body.fit import spline_through
-from manikin.planning.whole_body.fit_job import FitJob
+from manikin.planning.whole_body.fit_job import FitJob, key_instants
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_targets import (
@@ -266,9 +266,9 @@ def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
         yield part, first, first + len(more) + 1
 
 
-KNOT_SPACING, FINE = 0.035, (0.0,)
-"""Largest distance of the spline's knots [s], and the start as a place near which, as near all key instants,
-they are doubled: heels that rise there turn at up to 8 rad/s."""
+KNOT_SPACING = 0.035
+"""Largest distance of the spline's knots [s]. Near key instants they are doubled: heels that rise there turn
+at up to 8 rad/s."""
 
 STEP = 1e-3
 """Distance of the finished motion's samples [s]."""
@@ -387,7 +387,7 @@ class _Task:
         recorded: tuple[FloatArray, FloatArray], clock: tuple[FloatArray, FloatArray],
     ) -> "_Task":  # fmt: skip
         job = FitJob(KNOT_SPACING)
-        time, _ = job.samples(job.knots(schedule, FINE))
+        time, _ = job.samples(job.knots(schedule, (key_instants(schedule),)))
         reference = _postures(recorded, np.interp(time, *clock))
         paths, scale = effector_paths(body, schedule, time, reference), _posture_scale(body, time)
         lay_toes_flat(paths.toes, reference, scale)
@@ -400,7 +400,7 @@ class _Task:
             self, trajectory.position(self.time), trajectory.acceleration(self.time),
             trajectory.angular_momentum_rate(self.time),
         )  # fmt: skip
-        return self.job.solve(goal, SCALES, FINE)[1].spline
+        return self.job.solve(goal, SCALES, (key_instants(self.schedule),))[1].spline
 
 
 @dataclass(frozen=True, eq=False)
@@ -421,7 +421,8 @@ class _AdaptationGoal:
         """Residuals at the task's samples."""
         del scales
         task = self.task
-        start = spline_through(task.reference, basis, task.job.knots(task.schedule, FINE))
+        knots = task.job.knots(task.schedule, (key_instants(task.schedule),))
+        start = spline_through(task.reference, basis, knots)
         targets = FitTargets(
             time=time, schedule=task.schedule, effectors=task.paths.targets, com=self.com,
             com_weight=np.ones(len(time)), com_acceleration=self.acceleration, margin=np.zeros(len(time)),

@@ -151,10 +151,10 @@ class FitAttempt(Generic[G]):
         ]
         if not found:
             return self.fine
-        instants = self.goal.schedule.instants
-        numbers = np.arange(len(instants), dtype=np.float64)
-        whole = () if others is None or self.is_fine else tuple(numbers.tolist())
-        places = np.interp([row.time_s or 0.0 for row in found], instants, numbers)
+        schedule = self.goal.schedule
+        whole = () if others is None or self.is_fine else key_instants(schedule)
+        numbers = np.arange(len(schedule.instants))
+        places = np.interp([row.time_s or 0.0 for row in found], schedule.instants, numbers)
         return (*self.fine, (*whole, *places.tolist()))
 
     def is_stuck_after(self, before: "FitAttempt[G]") -> bool:
@@ -302,6 +302,11 @@ class FitJob:
     ) -> FitAttempt[G]:
         self.iterations += result.iterations
         return FitAttempt(goal, scales, fine, continued, fit, result, *goal.measure(result.spline))
+
+
+def key_instants(schedule: ContactSchedule) -> tuple[float, ...]:
+    """A group of places: the key instants of contacts in time."""
+    return tuple(map(float, range(len(schedule.instants))))
 
 
 def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:
