@@ -15,6 +15,7 @@ from manikin.numerics.banded import BlockBandedSystem
 from manikin.pipeline.runner import run
 from manikin.planning.com import plan_com
 from manikin.planning.whole_body import plan_whole_body
+from manikin.planning.whole_body.fit_job import key_instants
 from manikin.planning.whole_body.fit_targets import ignored_pairs
 from manikin.planning.whole_body.plan_whole_body import WholeBodySettings, _Goal, _Planner
 from manikin.planning.whole_body.posture_style import READY
@@ -72,11 +73,13 @@ def test_fit(benchmark, planner, swings):
 
 
 def test_strength(benchmark, planner, swings):
-    """Constrained steps on knots twice as close, until torques of half the strength become dear."""
+    """Constrained steps on closer knots at key instants, until torques of half the strength become dear."""
     goal = _Goal(planner, swings, planner.guide(swings, READY, None, False), READY, True)
     first = planner.job.attempt(goal, planner.settings.fit)
-    held, scales = replace(goal, forces=first.motion), replace(first.scales, strength_share=0.5)
-    benchmark.pedantic(planner.job.solve, args=(held, scales, 1, first.result.spline), rounds=3, iterations=1)
+    fine, scales = (key_instants(goal.schedule),), replace(first.scales, strength_share=0.5)
+    benchmark.pedantic(
+        planner.job.solve, args=(goal, scales, fine, first.result.spline), rounds=3, iterations=1
+    )
 
 
 def test_dense_clearance(benchmark, platform):

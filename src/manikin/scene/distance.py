@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray
 from manikin.scene.collision import Measured, Meter, collision_parts, pair_meter, part_meter
-from manikin.scene.distance_bounds import (
-    KnownDistances,
-    PairBounds,
-    PlacedShapes,
-    PlacementReader,
-)
+from manikin.scene.distance_bounds import KnownDistances, PairBounds, PlacedShapes, PlacementReader
 from manikin.scene.scene import Scene
 from manikin.scene.triangles import IntArray
 

@@ -145,10 +145,9 @@ class FitAttempt(Generic[G]):
         The first time that something else than the clearance is missed, the key instants are added. More
         knots where nothing is missed cost time and change nothing.
         """
-        others = self.certificate.worst(frozenset(keys) - CLEARANCE)
-        found = [
-            row for row in (others, self.certificate.worst(CLEARANCE & frozenset(keys))) if row is not None
-        ]
+        asked = frozenset(keys)
+        others, clearance = (self.certificate.worst(some) for some in (asked - CLEARANCE, asked & CLEARANCE))
+        found = [row for row in (others, clearance) if row is not None]
         if not found:
             return self.fine
         schedule = self.goal.schedule
@@ -341,9 +340,7 @@ def refined(knots: FloatArray, instants: FloatArray, within: float = 0.1) -> Flo
     """Clamped knots [s] with every span split in two that has an instant or is ``within`` [s] of one."""
     breaks = np.unique(knots)
     middle = 0.5 * (breaks[:-1] + breaks[1:])
-    near = (np.abs(middle[:, None] - instants) < np.maximum(within, 0.51 * np.diff(breaks))[:, None]).any(
-        axis=1
-    )
+    near = np.abs(middle[:, None] - instants).min(axis=1) < np.maximum(within, 0.51 * np.diff(breaks))
     inner = np.sort(np.concatenate([breaks, middle[near & (np.diff(breaks) > 2.0 * CLOSEST_KNOTS)]]))
     return np.concatenate([np.full(DEGREE, breaks[0]), inner, np.full(DEGREE, breaks[-1])])
 
