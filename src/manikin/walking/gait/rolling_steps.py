@@ -67,14 +67,14 @@ class RollRule:
 
     full_step: float = 0.7
     push_off: float = 1.0
-    touch: float = float(np.radians(16.0))
+    touch: float = 0.2
     flat: float = 0.16
-    latest_flat: float = 0.11
+    latest_flat: float = 0.07
     rise: float = 0.48
     longest: float = 0.8
-    lift: float = 0.055
+    lift: float = 0.065
     aside: float = 0.02
-    pressed_up: float = 0.005
+    pressed_up: float = 0.015
     pressed_off: float = 0.02
     slowest_flat: float = 0.05
 
@@ -184,7 +184,7 @@ class RollingFoot:
         heel = np.array([-0.5 * self.length, 0.0, 0.0])
         roll = FootRoll(
             np.array([before.up, off, land, after.flat]), start, stop, self.hinge, heel,
-            before.roll_out * rule.push_off, -after.roll_in * rule.touch, toes_back=0.85, landing_rate=0.5,
+            before.roll_out * rule.push_off, -after.roll_in * rule.touch, toes_back=0.85, landing_rate=1.2,
         )  # fmt: skip
         share = np.clip((time - off) / (land - off), 0.0, 1.0)
         done, (begin, end) = least_jerk(share)[0], roll.pivots
