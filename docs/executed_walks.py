@@ -60,8 +60,8 @@ its plan and shifts footprints.
 |---|---|---|---|---|---|---|---|
 """
 FAST = """
-At 1.5 m/s a fifth of the worlds end in a fall. With its loads as planned that walk asks for more
-than the strength of ankles and hips for some hundredths of a second in each step.
+A walk that asks for more than the strength of a joint, as that at 1.5 m/s in each step, is followed only
+nearly; the faster it is, the fewer worlds it stands.
 """
 STEPS = """
 Steps at full speed, beside those of people: step length and cadence of 43 people ($0.559\\,v^{0.523}$ m,
