@@ -18,7 +18,9 @@ import pinocchio as pin
 from manikin.balance.capturability import MARGIN as RISING_MARGIN
 from manikin.contact import Contact, ContactKind
 from manikin.numerics.spatial import yaw_about_normal
-from manikin.planning.contacts import ContactPlan, Footholds, Stage, rising_times
+from manikin.planning.contacts import ContactPlan, Stage, rising_times
+from manikin.planning.contacts.footholds import STEEPEST
+from manikin.planning.guide.ground import Ground
 from manikin.scenarios.problems import overhead_constraints
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.values import ScenarioValues, build_body
@@ -196,9 +198,7 @@ def _ceiling(plan: ContactPlan, number: int) -> dict[str, Any]:
     return {"position": top.tolist(), "normal": [-slope * x, -slope * y, 1.0]}
 
 
-def _walking_time(
-    plan: ContactPlan, number: int, ground: Footholds, times: StepTimes, *, rolls: bool
-) -> float:
+def _walking_time(plan: ContactPlan, number: int, ground: Ground, times: StepTimes, *, rolls: bool) -> float:
     """Least duration of a phase of a body that does not rest before or after it [s].
 
     A foot climbs to the highest surface below its straight way, and from there.
@@ -270,8 +270,8 @@ class _Supports:
         return any(self.passed) and _passes_below(self.plan, self.scenario)
 
     @cached_property
-    def _ground(self) -> Footholds:
-        return Footholds(build_body(self.scenario), build_scene(self.scenario))
+    def _ground(self) -> Ground:
+        return Ground(build_scene(self.scenario), STEEPEST)
 
     @cached_property
     def _rise(self) -> list[float]:

@@ -24,10 +24,9 @@ from manikin.planning.contacts.best_first import Extension
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
 from manikin.planning.contacts.crawl_postures import CRAWLERS, STYLES, CrawlPostures, CrawlStyle, fingers_out
 from manikin.planning.contacts.endpoint import Endpoints, Habit
-from manikin.planning.contacts.footholds import Footholds, feet_of
-from manikin.planning.contacts.footsteps import LOW_STEP, low_way
 from manikin.planning.contacts.posture_finder import PostureFinder
 from manikin.planning.contacts.walk_search import COLUMN, WalkSettings
+from manikin.planning.guide.ground import LOW_STEP, Ground, low_way
 from manikin.scene.collision import column_is_free
 
 HANDS = ("left_wrist", "right_wrist")
@@ -105,13 +104,12 @@ class CrawlSearch:
         return choice is not None
 
     def _planned(self) -> ContactPlan | str:
-        ends = feet_of(self._start.contacts), feet_of(self._goal.contacts)
-        footholds = Footholds(self._body, self._scene, steepest=STEEPEST)
+        ends = np.array([end.contacts[foot].position for end in (self._start, self._goal) for foot in FEET])
         low, high = (
             (self._size * radius, self._size * bottom, self._size * top)
             for radius, bottom, top in (CRAWLING, COLUMN)
         )
-        found = low_way(self._scene, footholds, ends, low, high)
+        found = low_way(self._scene, Ground(self._scene, STEEPEST), ends, low, high)
         if found is None:
             return "no way over the ground has room for the body on hands and knees"
         steps = np.linalg.norm(np.diff(found[0], axis=0), axis=1)

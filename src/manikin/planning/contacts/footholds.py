@@ -18,6 +18,7 @@ from manikin.body.segments import FEET
 from manikin.contact import Contact, sole
 from manikin.errors import ContactError
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.planning.guide.ground import ON_PLANE, Ground
 from manikin.scene import Scene
 from manikin.scene.collision import CollisionPart, collision_parts, column_is_clear
 from manikin.scene.footing import WHOLE, FootingTable, Places
@@ -29,7 +30,6 @@ FOOT_CLEARANCE = 0.015  # distance of the foot to what stands beside it [m]; our
 FLOWN = 0.45  # height from which on a foot passes beside what is there, at 1.75 m [m]; our choice
 BESIDE = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15)  # offsets of its way to the left [m]; our choice
 _PASSED = np.array([0.25, 0.5, 0.75])  # shares of a flight at which a foot needs room
-ON_PLANE = 0.02  # height up to which a neighbouring surface does not hinder a foot [m]
 _REQUEST = coal.CollisionRequest()
 _CLEAR = coal.CollisionRequest()
 _CLEAR.security_margin = FOOT_CLEARANCE
@@ -72,6 +72,11 @@ def feet_of(contacts: Mapping[str, Contact]) -> Feet:
     return Foothold(left.position, left.yaw, turns[0]), Foothold(right.position, right.yaw, turns[1])
 
 
+def heading_between(left: Foothold, right: Foothold) -> float:
+    """Heading of a body on two footholds [rad]."""
+    return math.atan2(math.sin(left.yaw) + math.sin(right.yaw), math.cos(left.yaw) + math.cos(right.yaw))
+
+
 @dataclass(frozen=True, eq=False)
 class Laid:
     """Footholds as arrays: positions (k, 3) [m], yaws (k,) [rad], shares (k,) and surfaces (k,)."""
@@ -87,6 +92,7 @@ class Footholds:
     """Finds places of soles in one scene; one instance works on buffers of its own.
 
     Attributes:
+        ground: Surfaces to stand on.
         size: Length and width of the sole [m].
         steepest: Largest slope of a surface to stand on [rad].
     """
@@ -103,35 +109,21 @@ class Footholds:
         if body.sole_length is None or body.sole_width is None:
             raise ContactError(f"body {body.name!r} has no soles; valid: a body that stands on feet")
         self.size, self.steepest = size or (body.sole_length, body.sole_width), steepest
-        surfaces = scene.surfaces_facing((0.0, 0.0, 1.0), steepest)
-        self._table = FootingTable(surfaces, 0.5 * np.array(self.size) * _CORNERS)
+        self.ground = Ground(scene, steepest)
+        self._table = FootingTable(self.ground.surfaces, 0.5 * np.array(self.size) * _CORNERS)
         self._parts = parts = [part for item in scene for part in collision_parts(item)]
         bounds = np.array([part.world_bounds for part in parts]).reshape(-1, 2, 3)
         self._low, self._high, self._lift = bounds[:, 0], bounds[:, 1], FLOWN * (body.stature or 1.75) / 1.75
         self._reach = 0.5 * float(np.linalg.norm([*self.size, FOOT_HEIGHT])) + 2.0 * FOOT_CLEARANCE
         self._foot = coal.Box(*self.size, FOOT_HEIGHT)
         self._wide_foot = coal.Box(*(side + 2.0 * FOOT_CLEARANCE for side in self.size), FOOT_HEIGHT)
-        self._point = FootingTable(self._table.surfaces, 1e-6 * _CORNERS)
-
-    def levels(self, places: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-        """Rows (m,) of places (k, 2) [m] that have a surface below or above, and its height there [m]."""
-        put = self._point.under(places, np.zeros(len(places)))
-        on = self._point.place(put.numbers, put.positions, put.rotations).share > 0.5
-        return put.rows[on], put.positions[on, 2]
-
-    def below(self, place: FloatArray) -> tuple[str, ...]:
-        """Names of the obstacles whose surface is at a place (3,) [m]; none without a surface."""
-        level = float(place[2])
-        put = self._point.under(place[None, :2], np.zeros(1), level - ON_PLANE, level + ON_PLANE)
-        on = self._point.place(put.numbers, put.positions, put.rotations).share > 0.5
-        return self._table.surfaces[int(put.numbers[on][0])].obstacles if on.any() else ()
 
     def faces(self, one: Foothold, other: Foothold) -> bool:
         """Whether what the higher of two is on goes on beside it, so that the lower one is behind it."""
         low, high = sorted((one, other), key=lambda hold: float(hold.position[2]))
         aside = rotation_from_yaw(high.yaw)[:, 1]
         beside = high.position + ((low.position - high.position) @ aside) * aside
-        return bool((np.abs(self.levels(beside[None, :2])[1] - beside[2]) < ON_PLANE).any())
+        return bool((np.abs(self.ground.levels(beside[None, :2])[1] - beside[2]) < ON_PLANE).any())
 
     def lay(self, places: FloatArray, yaws: FloatArray, level: float, rise: float) -> Laid:
         """Footholds at or near candidates.

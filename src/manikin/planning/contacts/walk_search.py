@@ -23,11 +23,12 @@ from manikin.kinematics.trunk_postures import CEILINGS, TrunkClearance, TrunkPos
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts.best_first import PosedSearch
 from manikin.planning.contacts.contact_plan import ContactPlan, Contacts, Paces, Stage
-from manikin.planning.contacts.footholds import Foothold, Footholds, feet_of
-from manikin.planning.contacts.footsteps import HELD_COST, HELD_HIGHEST, HIGHEST, STEP, FootstepSearch
+from manikin.planning.contacts.footholds import Foothold, Footholds, feet_of, heading_between
+from manikin.planning.contacts.footsteps import HELD_HIGHEST, HIGHEST, FootstepSearch
 from manikin.planning.contacts.handholds import Handholds
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 from manikin.planning.contacts.seat import leave_seat
+from manikin.planning.guide.ground import HELD_COST, STEP
 from manikin.scene import Scene
 
 COLUMN = (0.12, 0.5, 1.75 * CEILINGS[-1])
@@ -81,11 +82,12 @@ class _Stand:
     def between(self) -> FloatArray:
         """(4,) x, y and height of the ground [m] and heading [rad] between the feet."""
         left, right = self.left, self.right
-        yaw = math.atan2(math.sin(left.yaw) + math.sin(right.yaw), math.cos(left.yaw) + math.cos(right.yaw))
         middle = 0.5 * (left.position + right.position)
         low = min(float(left.position[2]), float(right.position[2]))
         # A foot that stands high folds its leg; the body is as high as the other one lets it.
-        return np.array([middle[0], middle[1], low + 0.4 * (float(middle[2]) - low), yaw])
+        return np.array(
+            [middle[0], middle[1], low + 0.4 * (float(middle[2]) - low), heading_between(left, right)]
+        )
 
 
 class BodyRoom:
