@@ -7,6 +7,7 @@ deep they go into them is measured apart.
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from types import MappingProxyType
 
 import numpy as np
@@ -20,11 +21,12 @@ from manikin.kinematics import touching_pairs
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, rotation_vector
 from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.whole_body.fit_targets import KeptDistances
 from manikin.planning.whole_body.refine_measures import RefineObstacles
 from manikin.planning.whole_body.sliding_touchdown import Ignored, SlidingTouchdown, sliding_touchdown_errors
 from manikin.runtime.requirement import Requirement, RequirementTable, Sense, requirement_table
 from manikin.scene import Proximity
-from manikin.scene.distance import MotionDistances, segment_of
+from manikin.scene.distance import MotionDistances, considered, segment_of
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class WholeBodyRequirements:
         com_error: Largest distance of the centre of mass from its plan [m].
         clearance: Least distance to obstacles and between body parts [m].
         penetration: Largest depth of anything in anything but what it holds on to, flights included [m].
+        sinking: Largest depth of what touches at a point, such as the heel of a hand, in what it touches [m].
         joint_limit: Largest violation of a joint range [rad].
         velocity_share: Largest share of a joint's velocity limit.
         missing_wrench: Largest part of the dynamics left without a contact force [N, N.m].
@@ -52,6 +55,7 @@ class WholeBodyRequirements:
     com_error: float = 2.0e-3
     clearance: float = 0.01
     penetration: float = 1.0e-3
+    sinking: float = 5.0e-3
     joint_limit: float = 1.0e-9
     velocity_share: float = 1.0
     missing_wrench: float = 1.0
@@ -78,6 +82,7 @@ QUANTITIES: Mapping[str, tuple[str, str, Sense, str]] = MappingProxyType({
     "min_clearance_m": ("clearance", "m", ">=", "clearance"),
     "max_scuff_m": ("depth of a flight in what it leaves or reaches", "m", "<=", ""),
     "max_penetration_m": ("penetration", "m", "<=", "penetration"),
+    "max_sinking_m": ("depth of what touches at a point", "m", "<=", "sinking"),
     "max_joint_limit_violation_rad": ("joint range violation", "rad", "<=", "joint_limit"),
     "max_velocity_share": ("share of a velocity limit", "", "<=", "velocity_share"),
     "max_missing_wrench": ("missing wrench", "N, N.m", "<=", "missing_wrench"),
@@ -198,6 +203,7 @@ def certify(
     body: BodyModel, proximity: Proximity, trajectory: CentroidalTrajectory, motion: Motion,
     ignored: tuple[Ignored, ...], wrench: FloatArray, meeting: SlidingTouchdown | None = None,
     polytopes: Sequence[WrenchPolytope] | None = None, requirements: WholeBodyRequirements | None = None,
+    points: KeptDistances | None = None,
 ) -> MotionCertificate:  # fmt: skip
     """Measure a motion against its contacts, centre of mass, limits and obstacles.
 
@@ -206,6 +212,7 @@ def certify(
         wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
         meeting: What is met at speed, at the motion's samples.
         polytopes: Of the phases, where they are known.
+        points: What touches at a point, at the motion's samples; not measured when omitted.
     """
     schedule, distances = trajectory.schedule, proximity.along(motion.q)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
@@ -215,7 +222,7 @@ def certify(
         "max_missing_wrench": np.linalg.norm(motion.tau[:, :6], axis=1),
     }
     scuff = deepest_penetration(body, distances, schedule, motion.time, ignored)
-    worst = {"max_scuff_m": (*scuff, "")}
+    worst = {"max_scuff_m": (*scuff, ""), **deepest_point(distances, points, motion.time)}
     stances, phases = [phase.stance for phase in schedule.sequence], schedule.phase_at(motion.time)
     return _certificate(
         body, distances, schedule, motion, ignored, series, worst,
@@ -248,6 +255,7 @@ def certify_refined(
             float(motion.time[flying.sample]),
             " and ".join(flying.pair or ()),
         ),
+        **deepest_point(distances, obstacles.points, motion.time),
     }
     return _certificate(
         body, distances, schedule, motion, obstacles.during_flights(), {"max_physics_violation": violation},
@@ -394,6 +402,27 @@ def _errors(body: BodyModel, contact: Contact, own: _Poses, carrier: _Poses) -> 
         points = points - body.segment(segment).origin
     actual = carrier[1][:, None] + points @ carrier[0].transpose(0, 2, 1)
     return np.linalg.norm(actual - contact.points_in_world, axis=2).max(axis=1), still
+
+
+def deepest_point(
+    distances: MotionDistances, points: KeptDistances | None, time: FloatArray
+) -> dict[str, tuple[float, float, str]]:
+    """Row ``max_sinking_m`` of what goes deepest into what it touches at a point; none without such.
+
+    The row has the depth [m], zero where nothing goes in, its time [s] and the names of the two.
+    """
+    found = [
+        distances.minimum(
+            frozenset(compress(distances.pairs, considered(distances.pairs, pairs))), tolerance=1e-5,
+            rows=np.flatnonzero(np.isfinite(wanted)),
+        )
+        for pairs, wanted in (points.pairs if points else ())
+    ]  # fmt: skip
+    if not found:
+        return {}
+    deepest = min(found, key=lambda item: float(item.distance))
+    where = " and ".join(deepest.pair or ())
+    return {"max_sinking_m": (max(0.0, -float(deepest.distance)), float(time[deepest.sample]), where)}
 
 
 def deepest_penetration(

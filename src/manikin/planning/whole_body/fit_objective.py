@@ -117,8 +117,7 @@ class MotionObjective:
         self._known = KnownDistances()
         meeting = targets.meeting
         self._ignored = targets.ignored if meeting is None else meeting.without(targets.ignored)
-        if targets.low_flights is not None:
-            self._ignored = targets.low_flights.without(self._ignored)
+        self._ignored = targets.kept.without(self._ignored)
         self._last: tuple[FloatArray, MotionSamples] | None = None
         self._forces: HeldForces | None = None
         with np.errstate(divide="ignore"):
@@ -215,10 +214,9 @@ class MotionObjective:
         jacobian, residual = _padded(found.sample, rows, value, len(motion.com))
         out.add(0, to_raw(jacobian, motion.tangent), residual)
 
-    def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray | float:
+    def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray:
         """Wanted clearance of close pairs [m]."""
-        flights = self.targets.low_flights
-        return scales.safe_distance if flights is None else flights.wanted(found, scales.safe_distance)
+        return self.targets.kept.wanted(found, scales.safe_distance)
 
     def _add_reference(self, out: FitLinearisation, motion: MotionSamples) -> None:
         """Deviation from the reference posture; the pelvis' place does not count."""

@@ -1,12 +1,12 @@
 """Targets of a whole-body motion at its samples: effectors, toes, and pairs that may touch."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment, hangs
@@ -85,7 +85,7 @@ class FitTargets:
         ends: (nq,) postures in which the body rests at the start and at the end; None where it only comes to
             rest.
         settles: Whether it comes to rest at the end without acceleration: another part goes on from there.
-        low_flights: What feet in flight keep off although it is ignored, or None without.
+        kept: Distances of pairs that may touch and still keep some.
     """
 
     time: FloatArray
@@ -105,7 +105,7 @@ class FitTargets:
     strength: bool = True
     ends: tuple[FloatArray | None, FloatArray | None] = (None, None)
     settles: bool = False
-    low_flights: "LowFlights | None" = None
+    kept: "KeptDistances" = field(default_factory=lambda: KeptDistances(()))
 
 
 def effector_targets(
@@ -313,28 +313,31 @@ def ignored_pairs(
     return with_pairs([per_phase[index] for index in schedule.phase_at(time)], landing)
 
 
+SUNK = 4.0e-3
+"""Depth to which what touches at a point may go into it [m]: 1 mm less than a certificate allows."""
+
 LOW, TOUCHING, RISING = 4.0e-3, 8.0e-3, 0.3
 """Distance that a foot in flight keeps at least from what it leaves and reaches, and depth that is allowed at
 the contact itself, where places alone decide [m]; share of the flight in which one becomes the other."""
 
 
 @dataclass(frozen=True, eq=False)
-class LowFlights:
-    """Distances that feet in flight keep from what they leave and reach.
+class KeptDistances:
+    """Distances that pairs keep although they may touch: of feet in flight, and of what touches at a point.
 
     Attributes:
-        ends: Of each end of a flight the pairs of segment and obstacle, and the distance (n,) that is wanted
-            at each sample [m]; infinite outside the flight.
+        pairs: Of each, the pairs of segment and obstacle, and the distance (n,) that is wanted at each sample
+            [m]; infinite where it is not.
     """
 
-    ends: tuple[tuple[Ignored, FloatArray], ...]
+    pairs: tuple[tuple[Ignored, FloatArray], ...]
 
     @classmethod
     def of(
         cls, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
-    ) -> "LowFlights | None":
-        """Those of flights between soles at times (n,) [s]; None without any."""
-        ends = list[tuple[Ignored, FloatArray]]()
+    ) -> "KeptDistances":
+        """Those of flights between soles, and of points that are held, at times (n,) [s]."""
+        ends = list(cls.of_points(body, scene, schedule, time).pairs)
         for swing in schedule.sequence.swings():
             if swing.start is None or swing.end is None or not hangs(body, swing.effector):
                 continue
@@ -348,24 +351,45 @@ class LowFlights:
                 wanted = share**2 * (3.0 - 2.0 * share) * (LOW + TOUCHING) - TOUCHING
                 wanted[(time < start) | (time >= end)] = np.inf
                 ends.append((touch_pairs(body, scene, contact), wanted))
-        return cls(tuple(ends)) if ends else None
+        return cls(tuple(ends))
+
+    @classmethod
+    def of_points(
+        cls, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray,
+        padded: Ignored = frozenset(),
+    ) -> "KeptDistances":  # fmt: skip
+        """Those of contacts at a point, such as the heel of a hand, whose segments are not in what it is on.
+
+        Nothing is kept of ``padded`` pairs.
+        """
+        held, phases = dict[Ignored, FloatArray](), schedule.phase_at(time)
+        for number, phase in enumerate(schedule.sequence):
+            for contact in phase.stance:
+                if contact.kind is ContactKind.POINT:
+                    wanted = held.setdefault(
+                        touch_pairs(body, scene, contact) - padded, np.full(len(time), np.inf)
+                    )
+                    wanted[phases == number] = -SUNK
+        return cls(tuple(held.items()))
 
     def without(self, ignored: Sequence[Ignored]) -> tuple[Ignored, ...]:
-        """The pairs that are ignored at each sample, but for those of feet in flight."""
+        """The pairs that are ignored at each sample, but for those that keep a distance there."""
+        if not self.pairs:
+            return tuple(ignored)
 
         @cache
-        def apart(found: Ignored, *flying: bool) -> Ignored:
-            return found.difference(*(self.ends[k][0] for k, counts in enumerate(flying) if counts))
+        def apart(found: Ignored, *counting: bool) -> Ignored:
+            return found.difference(*(self.pairs[k][0] for k, counts in enumerate(counting) if counts))
 
-        flying = np.isfinite([wanted for _, wanted in self.ends]).T.tolist()
-        return tuple(apart(found, *row) for found, row in zip(ignored, flying, strict=True))
+        counting = np.isfinite([wanted for _, wanted in self.pairs]).T.tolist()
+        return tuple(apart(found, *row) for found, row in zip(ignored, counting, strict=True))
 
-    def wanted(self, found: ProximitySamples, safe: float) -> FloatArray:
-        """(k,) wanted distances of close pairs, ``safe`` of all but feet in flight [m]."""
+    def wanted(self, found: ProximitySamples, safe: ArrayLike) -> FloatArray:
+        """(k,) wanted distances of close pairs, ``safe``, one or (k,), of all others [m]."""
         wanted, distinct = np.full(len(found.distance), safe), list(dict.fromkeys(found.pairs))
         numbers = {pair: number for number, pair in enumerate(distinct)}
         number = np.array([numbers[pair] for pair in found.pairs], dtype=np.int64)
-        for pairs, distance in self.ends:
+        for pairs, distance in self.pairs:
             rows = ~considered(distinct, pairs)[number]
             wanted[rows] = np.minimum(wanted[rows], distance[found.sample[rows]])
         return wanted

@@ -38,7 +38,7 @@ from manikin.planning.whole_body.fit_targets import (
     FLAT_TOES,
     EffectorTarget,
     FitTargets,
-    LowFlights,
+    KeptDistances,
     effector_targets,
     flat_share,
     ignored_pairs,
@@ -85,6 +85,7 @@ STRENGTH_STEP = 0.05
 PENALTIES = MappingProxyType({
     "max_meeting_error_m": ("position",),
     "min_clearance_m": ("clearance",),
+    "max_sinking_m": ("clearance",),
     "max_joint_limit_violation_rad": ("joint_limit",),
     "max_velocity_share": ("joint_velocity",),
     "max_missing_wrench": ("force", "moment_share"),
@@ -227,6 +228,7 @@ class _Goal:
             planner.body, planner.proximity, planner.trajectory, motion, ignored, wrench,
             sliding_touchdown_at(planner.body, planner.scene, schedule, time), planner.polytopes,
             planner.settings.requirements,
+            KeptDistances.of_points(planner.body, planner.scene, schedule, time, planner.leaning),
         )  # fmt: skip
 
     def failure(self, certificate: MotionCertificate) -> WholeBodyFailure | None:
@@ -262,7 +264,7 @@ class _Goal:
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             ends=planner.ends, settles=planner.settles,
-            low_flights=LowFlights.of(planner.body, planner.scene, schedule, time),
+            kept=KeptDistances.of(planner.body, planner.scene, schedule, time),
         )  # fmt: skip
 
 

@@ -80,6 +80,7 @@ _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
 PENALTIES = MappingProxyType({
     "min_clearance_m": ("clearance",),
     "max_penetration_m": ("clearance", "touching"),
+    "max_sinking_m": ("clearance",),
     "max_joint_limit_violation_rad": ("joint_limit",),
     "max_velocity_share": ("joint_velocity",),
     "max_physics_violation": ("missing_wrench", "margin_violation"),

@@ -20,6 +20,7 @@ from manikin.kinematics.efort import Task
 from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_map
+from manikin.planning.whole_body.fit_targets import KeptDistances
 from manikin.planning.whole_body.refine_contacts import (
     LEAST,
     contact_variables,
@@ -51,6 +52,7 @@ class RefineObstacles:
 
     Attributes:
         ignored: Pairs of segment and obstacle that may touch at each sample, because they are in contact.
+        points: What of them touches at a point, and goes no deeper than that.
 
     Raises:
         ContactError: If a contact lies on no obstacle.
@@ -66,6 +68,7 @@ class RefineObstacles:
             for phase in schedule.sequence
         ]
         self.ignored: tuple[Ignored, ...] = tuple(held[phase] for phase in schedule.phase_at(time))
+        self.points = KeptDistances.of_points(body, scene, schedule, time, leaning)
         self._obstacles, names = [obstacle.name for obstacle in scene], schedule.sequence.effectors
         # Of each end of a flight the segments and the obstacle that they leave or reach; (n,) 0 at the
         # contact, 1 far from it or outside the flight; and whether a hand has its fingers around it.

@@ -89,8 +89,9 @@ def refine_targets(
     return RefineTargets(
         time, schedule, contact_targets(schedule, time, variables, scales.position / scales.approach, rolls),
         com=np.zeros((n, 3)), com_weight=np.zeros(n), com_acceleration=np.zeros((n, 3)), margin=np.zeros(n),
-        reference=reference, reference_scale=guide, ignored=obstacles.ignored, variables=variables, load=load,
-        limbs=limb_directions(body, path, schedule, time, task), obstacles=obstacles,
+        reference=reference, reference_scale=guide, ignored=obstacles.ignored, kept=obstacles.points,
+        variables=variables, load=load, limbs=limb_directions(body, path, schedule, time, task),
+        obstacles=obstacles,
     )  # fmt: skip
 
 
@@ -170,7 +171,8 @@ class RefineObjective(MotionObjective):
 
     def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray:
         assert isinstance(scales, RefineScales)
-        return self._refine.obstacles.wanted(found, scales.safe_distance, -scales.touching)
+        wanted = self._refine.obstacles.wanted(found, scales.safe_distance, -scales.touching)
+        return self._refine.kept.wanted(found, wanted)
 
     def _add_ranges(self, out: FitLinearisation, raw: FloatArray, scales: MotionScales) -> None:
         """Joint ranges, and knees that stay bent."""
