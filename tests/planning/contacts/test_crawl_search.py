@@ -39,16 +39,16 @@ def tunnel(height, length=0.2, side=0.45, yaw=0.0):
     ])  # fmt: skip
 
 
-def prepared(scene, away, yaw=0.0):
-    finder = PostureFinder(BODY, scene)
+def prepared(scene, away, yaw=0.0, body=BODY):
+    finder = PostureFinder(body, scene)
     ends = Endpoints(finder, 0.7)
     heading = rotation_from_yaw(yaw)[:2, 0]
     start, goal = (ends.find(far * heading, yaw, Habit.STANDING).stage for far in (0.0, away))
     return CrawlSearch(finder, ends, start, goal, 0.7, lambda a, b: WalkSearch(finder, a, b).run())
 
 
-def searched(scene, away, yaw=0.0):
-    return prepared(scene, away, yaw).run()
+def searched(scene, away, yaw=0.0, body=BODY):
+    return prepared(scene, away, yaw, body).run()
 
 
 def test_a_tunnel_is_crawled_through_whatever_its_heading(checked):
@@ -166,3 +166,17 @@ def test_who_cannot_fold_so_low_does_not_walk_there(share, walks):
     ends = Endpoints(finder, 0.7)
     start, goal = (ends.find(np.array([far, 0.0]), 0.0, Habit.STANDING).stage for far in (0.0, 2.3))
     assert (WalkSearch(finder, start, goal).search.walled_off() is None) == walks
+
+
+@pytest.mark.parametrize(("stature", "mass"), [(1.81, 94.1), (1.91, 115.9)])
+def test_a_broad_trunk_is_lifted_off_the_thighs_as_the_hands_leave(stature, mass):
+    """Chest and thighs lie on each other there; by the straight way one was up to 3 cm in the other."""
+    body = human(stature, mass, "female")
+    size = stature / 1.75
+    found = searched(tunnel(0.68 * size, side=0.5), 2.1 * size, body=body)
+    assert found.failure is None
+    finder, stages = PostureFinder(body, Scene([])), found.plan.stages
+    ends = [*(stage.q for stage in stages[1:]), found.plan.goal]
+    for stage, q in zip(stages, ends, strict=True):
+        way = [stage.q, q] if stage.via is None else [stage.q, stage.via, q]
+        assert finder.crossing(*way) == ""

@@ -7,6 +7,7 @@ quarter of their strength at rest.  Wrists bend back by 70 degrees at most, so e
 import math
 from collections.abc import Mapping
 from functools import cache, partial
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -109,12 +110,13 @@ class CrawlPostures:
         return posed
 
     def between(
-        self, staying: Contacts, name: str, middle: FloatArray, postures: tuple[FloatArray, FloatArray]
-    ) -> FloatArray | None:
-        """(nq,) posture half way between two, a limb near a place (3,) off the ground [m]."""
+        self, staying: Contacts, postures: tuple[FloatArray, FloatArray],
+        places: Mapping[str, FloatArray] = MappingProxyType({}),
+    ) -> FloatArray | None:  # fmt: skip
+        """(nq,) posture half way between two, limbs near places (3,) off the ground [m]."""
         start = 0.5 * (postures[0] + postures[1])
         start[3:7] = postures[1][3:7]
-        wishes = {name: _wished(middle)}
+        wishes = {name: _wished(place) for name, place in places.items()}
         return self.finder.pose(staying, staying, start, start, placements=wishes, preferences=_PREFERENCES).q
 
     def over(self, contacts: Contacts, style: CrawlStyle = UPRIGHT) -> FloatArray:

@@ -214,13 +214,17 @@ class CrawlSearch:
                 return f"{leaving or landing} cannot {'be put down' if landing else 'leave'}: {posed.reason}"
             if np.abs(posed.q - before)[7:].max() > WIDEST:
                 return f"a joint turns too far as {leaving or landing} {'lands' if landing else 'leaves'}"
-            ways = [before, posed.q]
+            ways, via = [before, posed.q], None
             if landing is not None:
                 start = Configuration(self._body, before).effector_placement(landing)[1]
                 middle = 0.5 * (start + feet[landing].position) + STEP * feet[landing].normal
-                via = self._postures.between(contacts, landing, middle, (before, posed.q))
+                via = self._postures.between(contacts, (before, posed.q), {landing: middle})
                 if via is None:
                     return f"{landing} finds no way to {_text(feet[landing].position)}"
+            elif self._postures.finder.crossing(*ways):
+                # A broad trunk is lifted off the thighs before it turns.
+                via = self._postures.between(contacts, (before, posed.q))
+            if via is not None:
                 stages[-1] = Stage.of(self._body, contacts, before, TURNING, via=via)
                 ways.insert(1, via)
             if crossed := self._postures.finder.crossing(*ways):
@@ -279,7 +283,7 @@ class CrawlSearch:
                 reason = f"{name} cannot be put down at {_text(contact.position)}: {landing.reason}"
                 continue
             middle = 0.5 * (contacts[name].position + contact.position) + LIFT * contact.normal
-            via = self._crawling.between(staying, name, middle, (lifted.q, landing.q))
+            via = self._crawling.between(staying, (lifted.q, landing.q), {name: middle})
             if via is None:
                 reason = f"{name} finds no way to {_text(contact.position)}"
                 continue
