@@ -36,6 +36,7 @@ from manikin.planning.whole_body.fit_targets import (
     GRASP_ROTATION_WEIGHT,
     EffectorTarget,
     FitTargets,
+    KeptDistances,
     flight_weight,
     ignored_pairs,
     lay_toes_flat,
@@ -327,7 +328,10 @@ def adapt_postures(
     dense = np.linspace(0.0, trajectory.duration, max(2, round(trajectory.duration / STEP) + 1))
     motion, wrench = full_motion(body, schedule, polytopes, dense, *spline.evaluate(dense))
     ignored = ignored_pairs(body, scene, schedule, dense)
-    certificate = certify(body, task.proximity, trajectory, motion, ignored, wrench, polytopes=polytopes)
+    points = KeptDistances.of_points(body, scene, schedule, dense)
+    certificate = certify(
+        body, task.proximity, trajectory, motion, ignored, points, wrench, polytopes=polytopes
+    )
     compared = [7 + joint for joint in range(body.nq - 7) if joint not in task.paths.toes]
     away = motion.q[:, compared] - _postures(recorded, np.interp(dense, *clock))[:, compared]
     return AdaptedMotion(motion, certificate, float(np.sqrt(np.mean(away**2))))
@@ -369,6 +373,7 @@ class _Task:
         reference: (n, nq) recorded postures, with the toes that the contacts need.
         scale: (n, nv) deviation from them that costs one unit [rad].
         ignored: Pairs that may touch, per sample.
+        kept: Distances that those of them keep which are held at a point.
     """
 
     body: BodyModel
@@ -380,6 +385,7 @@ class _Task:
     scale: FloatArray
     paths: EffectorPaths
     ignored: tuple[Ignored, ...]
+    kept: KeptDistances
 
     @classmethod
     def of(
@@ -392,7 +398,8 @@ class _Task:
         paths, scale = effector_paths(body, schedule, time, reference), _posture_scale(body, time)
         lay_toes_flat(paths.toes, reference, scale)
         ignored = ignored_pairs(body, scene, schedule, time)
-        return cls(body, Proximity(body, scene), schedule, job, time, reference, scale, paths, ignored)
+        kept = KeptDistances.of_points(body, scene, schedule, time)
+        return cls(body, Proximity(body, scene), schedule, job, time, reference, scale, paths, ignored, kept)
 
     def follow(self, trajectory: CentroidalTrajectory) -> ConfigurationSpline:
         """Fit to a planned centre of mass and its angular momentum."""
@@ -426,7 +433,8 @@ class _AdaptationGoal:
         targets = FitTargets(
             time=time, schedule=task.schedule, effectors=task.paths.targets, com=self.com,
             com_weight=np.ones(len(time)), com_acceleration=self.acceleration, margin=np.zeros(len(time)),
-            reference=task.reference, reference_scale=task.scale, ignored=task.ignored, turning=self.turning,
+            reference=task.reference, reference_scale=task.scale, ignored=task.ignored, kept=task.kept,
+            turning=self.turning,
             reference_second=_steady_ends(time, basis.evaluate(start.control_points, 2)),
         )  # fmt: skip
         return MotionObjective(task.body, task.proximity, targets, basis)

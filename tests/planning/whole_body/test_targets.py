@@ -254,4 +254,4 @@ def test_a_foot_keeps_its_whole_distance_while_its_knee_carries():
     sequence = StanceSequence([Phase(Stance(contacts, 1500.0)) for contacts in held])
     schedule = ContactSchedule(sequence, np.arange(6.0))
     kept = KeptDistances.of(BODY, SCENE, schedule, np.linspace(0.0, 5.0, 6))
-    assert not any("foot" in segment for pairs, _ in kept.pairs for segment, _ in pairs)
+    assert not any("foot" in segment for pairs, _ in kept.entries for segment, _ in pairs)

@@ -221,8 +221,8 @@ class CrawlSearch:
                 via = self._postures.between(contacts, (before, posed.q), {landing: middle})
                 if via is None:
                     return f"{landing} finds no way to {_text(feet[landing].position)}"
-            elif self._postures.finder.crossing(*ways):
-                # A broad trunk is lifted off the thighs before it turns.
+            elif len(stages) > 1 and self._postures.finder.crossing(*ways):
+                # A broad trunk keeps clear of the thighs half-way. The first stage is joined to the crawl.
                 via = self._postures.between(contacts, (before, posed.q))
             if via is not None:
                 stages[-1] = Stage.of(self._body, contacts, before, TURNING, via=via)

@@ -102,9 +102,9 @@ class FootstepSearch:
         self._too_hard: list[FloatArray] = []
         self._offsets = _offsets(scale)
         heights = HIGHEST * scale, HELD_HIGHEST * scale, self._highest * scale
-        places, pace = np.array([hold.position for hold in self.holds]), 4.0 / 3.0 * STEP / (stride * scale)
+        places = np.array([hold.position for hold in self.holds])
         self._field = GroundField(
-            scene, footholds.ground, places, heading_between(*goal), column, pace, heights
+            scene, footholds.ground, places, heading_between(*goal), column, stride * scale, heights
         )
         yaws = np.array([hold.yaw for hold in self.holds])
         self._ahead: list[float] = self._field.costs(places, yaws).tolist()

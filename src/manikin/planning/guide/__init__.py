@@ -1,4 +1,7 @@
-"""Guides for the root: reachability roadmaps, queries and shortcuts ([Tonneau2015]_ chapter 6)."""
+"""Guides for the root: reachability roadmaps, queries and shortcuts ([Tonneau2015]_ chapter 6).
+
+Ways over the ground for a column in its place are in :mod:`manikin.planning.guide.ground`.
+"""
 
 from manikin.planning.guide.abstraction import Abstraction, LimbReach, TrunkShape, abstraction_of
 from manikin.planning.guide.checker import NO_MARGINS, Margins, ReachabilityChecker

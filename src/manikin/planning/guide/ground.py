@@ -61,7 +61,7 @@ class GroundField:
 
     def __init__(
         self, scene: Scene, ground: Ground, ends: FloatArray, heading: float,
-        column: tuple[float, float, float], pace: float, highest: tuple[float, float, float],
+        column: tuple[float, float, float], stride: float, highest: tuple[float, float, float],
         gap: float = GAP,
     ) -> None:  # fmt: skip
         """Compute the costs.
@@ -70,7 +70,7 @@ class GroundField:
             ends: (4, 3) places of two feet at the start, then at the goal [m].
             heading: Of the goal [rad].
             column: Radius, lowest and highest end above the ground of what has to be free [m].
-            pace: Cost of a way on level ground [s/m].
+            stride: Way between two feet that costs least over level ground [m].
             highest: Steps that the body makes on its feet alone, without facing what is higher, and at all
                 [m].
             gap: Longest way between cells over no ground; none when zero [m].
@@ -104,7 +104,7 @@ class GroundField:
             near = np.vstack([near, far[self._is_open(far)]])
         self._near, away = near, points[near[:, 0]] - points[near[:, 1]]
         self._rise = rise = np.abs(away[:, 2])
-        self._pace = pace
+        self._pace = pace = STEP * (1.0 + 1.0 / 3.0) / stride
         slower = 0.5 * (slow[near[:, 0]] + slow[near[:, 1]])
         length = pace * slower * np.linalg.norm(away[:, :2], axis=1) + 1.2 * rise
         length += np.where(rise > easy, 8.0 * (rise - 0.2) + HELD_COST, 0.0)

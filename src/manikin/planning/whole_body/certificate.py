@@ -2,7 +2,7 @@
 
 Nothing here comes from the solver: all is computed again from the samples of the finished motion.  Feet and
 hands in flight begin and end at distance zero from their supports, which does not count as clearance; how
-deep they go into them is measured apart.
+deep they go into them is measured apart, and so is what is held at a point, as the palm above its heel.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -201,18 +201,18 @@ CAUGHT = 0.02
 
 def certify(
     body: BodyModel, proximity: Proximity, trajectory: CentroidalTrajectory, motion: Motion,
-    ignored: tuple[Ignored, ...], wrench: FloatArray, meeting: SlidingTouchdown | None = None,
-    polytopes: Sequence[WrenchPolytope] | None = None, requirements: WholeBodyRequirements | None = None,
-    points: KeptDistances | None = None,
+    ignored: tuple[Ignored, ...], points: KeptDistances, wrench: FloatArray,
+    meeting: SlidingTouchdown | None = None, polytopes: Sequence[WrenchPolytope] | None = None,
+    requirements: WholeBodyRequirements | None = None,
 ) -> MotionCertificate:  # fmt: skip
     """Measure a motion against its contacts, centre of mass, limits and obstacles.
 
     Args:
         ignored: Pairs that may touch, per sample.
+        points: Those of them that are held at a point, whose depth counts.
         wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
         meeting: What is met at speed, at the motion's samples.
         polytopes: Of the phases, where they are known.
-        points: What touches at a point, at the motion's samples; not measured when omitted.
     """
     schedule, distances = trajectory.schedule, proximity.along(motion.q)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
@@ -405,9 +405,9 @@ def _errors(body: BodyModel, contact: Contact, own: _Poses, carrier: _Poses) -> 
 
 
 def deepest_point(
-    distances: MotionDistances, points: KeptDistances | None, time: FloatArray
+    distances: MotionDistances, points: KeptDistances, time: FloatArray
 ) -> dict[str, tuple[float, float, str]]:
-    """Row ``max_sinking_m`` of what goes deepest into what it touches at a point; none without such.
+    """Row ``max_sinking_m`` of what is held at a point and goes deepest into what it touches; or none.
 
     The row has the depth [m], zero where nothing goes in, its time [s] and the names of the two.
     """
@@ -416,7 +416,7 @@ def deepest_point(
             frozenset(compress(distances.pairs, considered(distances.pairs, pairs))), tolerance=1e-5,
             rows=np.flatnonzero(np.isfinite(wanted)),
         )
-        for pairs, wanted in (points.pairs if points else ())
+        for pairs, wanted in points.entries
     ]  # fmt: skip
     if not found:
         return {}

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment, hangs
 from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, SolePart
+from manikin.kinematics.posture_terms import SINKING
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.foot_roll import Rolls
 from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown, with_pairs
@@ -313,9 +314,6 @@ def ignored_pairs(
     return with_pairs([per_phase[index] for index in schedule.phase_at(time)], landing)
 
 
-SUNK = 4.0e-3
-"""Depth to which what touches at a point may go into it [m]: 1 mm less than a certificate allows."""
-
 LOW, TOUCHING, RISING = 4.0e-3, 8.0e-3, 0.3
 """Distance that a foot in flight keeps at least from what it leaves and reaches, and depth that is allowed at
 the contact itself, where places alone decide [m]; share of the flight in which one becomes the other."""
@@ -323,21 +321,22 @@ the contact itself, where places alone decide [m]; share of the flight in which 
 
 @dataclass(frozen=True, eq=False)
 class KeptDistances:
-    """Distances that pairs keep although they may touch: of feet in flight, and of what touches at a point.
+    """Distances that pairs keep although they may touch: feet in flight, and what is held at a point.
 
     Attributes:
-        pairs: Of each, the pairs of segment and obstacle, and the distance (n,) that is wanted at each sample
-            [m]; infinite where it is not.
+        entries: For each group of pairs of segment and obstacle that share one, the distance (n,) that is
+            wanted at each sample [m]; infinite where none is.
     """
 
-    pairs: tuple[tuple[Ignored, FloatArray], ...]
+    entries: tuple[tuple[Ignored, FloatArray], ...]
 
     @classmethod
     def of(
-        cls, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
-    ) -> "KeptDistances":
-        """Those of flights between soles, and of points that are held, at times (n,) [s]."""
-        ends = list(cls.of_points(body, scene, schedule, time).pairs)
+        cls, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray,
+        padded: Ignored = frozenset(),
+    ) -> "KeptDistances":  # fmt: skip
+        """Those of flights between soles, and of :meth:`of_points`, at times (n,) [s]."""
+        ends = list(cls.of_points(body, scene, schedule, time, padded).entries)
         for swing in schedule.sequence.swings():
             if swing.start is None or swing.end is None or not hangs(body, swing.effector):
                 continue
@@ -358,30 +357,29 @@ class KeptDistances:
         cls, body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray,
         padded: Ignored = frozenset(),
     ) -> "KeptDistances":  # fmt: skip
-        """Those of contacts at a point, such as the heel of a hand, whose segments are not in what it is on.
+        """Those of contacts at a point while they are held, such as the heel of a hand below its palm.
 
-        Nothing is kept of ``padded`` pairs.
+        The segments that touch go at most 4 mm into what they touch. Nothing is kept of ``padded`` pairs.
         """
         held, phases = dict[Ignored, FloatArray](), schedule.phase_at(time)
         for number, phase in enumerate(schedule.sequence):
             for contact in phase.stance:
                 if contact.kind is ContactKind.POINT:
-                    wanted = held.setdefault(
-                        touch_pairs(body, scene, contact) - padded, np.full(len(time), np.inf)
-                    )
-                    wanted[phases == number] = -SUNK
-        return cls(tuple(held.items()))
+                    pairs = touch_pairs(body, scene, contact) - padded
+                    wanted = held.setdefault(pairs, np.full(len(time), np.inf))
+                    wanted[phases == number] = SINKING
+        return cls(tuple((pairs, wanted) for pairs, wanted in held.items() if pairs))
 
     def without(self, ignored: Sequence[Ignored]) -> tuple[Ignored, ...]:
         """The pairs that are ignored at each sample, but for those that keep a distance there."""
-        if not self.pairs:
+        if not self.entries:
             return tuple(ignored)
 
         @cache
         def apart(found: Ignored, *counting: bool) -> Ignored:
-            return found.difference(*(self.pairs[k][0] for k, counts in enumerate(counting) if counts))
+            return found.difference(*(self.entries[k][0] for k, counts in enumerate(counting) if counts))
 
-        counting = np.isfinite([wanted for _, wanted in self.pairs]).T.tolist()
+        counting = np.isfinite([wanted for _, wanted in self.entries]).T.tolist()
         return tuple(apart(found, *row) for found, row in zip(ignored, counting, strict=True))
 
     def wanted(self, found: ProximitySamples, safe: ArrayLike) -> FloatArray:
@@ -389,7 +387,7 @@ class KeptDistances:
         wanted, distinct = np.full(len(found.distance), safe), list(dict.fromkeys(found.pairs))
         numbers = {pair: number for number, pair in enumerate(distinct)}
         number = np.array([numbers[pair] for pair in found.pairs], dtype=np.int64)
-        for pairs, distance in self.pairs:
+        for pairs, distance in self.entries:
             rows = ~considered(distinct, pairs)[number]
             wanted[rows] = np.minimum(wanted[rows], distance[found.sample[rows]])
         return wanted

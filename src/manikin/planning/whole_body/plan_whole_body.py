@@ -225,10 +225,10 @@ class _Goal:
         if planner.leaning:
             ignored = tuple(pairs | planner.leaning for pairs in ignored)
         return motion, certify(
-            planner.body, planner.proximity, planner.trajectory, motion, ignored, wrench,
+            planner.body, planner.proximity, planner.trajectory, motion, ignored,
+            KeptDistances.of_points(planner.body, planner.scene, schedule, time, planner.leaning), wrench,
             sliding_touchdown_at(planner.body, planner.scene, schedule, time), planner.polytopes,
             planner.settings.requirements,
-            KeptDistances.of_points(planner.body, planner.scene, schedule, time, planner.leaning),
         )  # fmt: skip
 
     def failure(self, certificate: MotionCertificate) -> WholeBodyFailure | None:
@@ -264,7 +264,7 @@ class _Goal:
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
             loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             ends=planner.ends, settles=planner.settles,
-            kept=KeptDistances.of(planner.body, planner.scene, schedule, time),
+            kept=KeptDistances.of(planner.body, planner.scene, schedule, time, planner.leaning),
         )  # fmt: skip
 
 

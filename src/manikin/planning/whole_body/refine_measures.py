@@ -52,7 +52,7 @@ class RefineObstacles:
 
     Attributes:
         ignored: Pairs of segment and obstacle that may touch at each sample, because they are in contact.
-        points: What of them touches at a point, and goes no deeper than that.
+        points: Distances that those of them keep which are held at a point.
 
     Raises:
         ContactError: If a contact lies on no obstacle.
