@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.body import BodyModel
-from manikin.body.limbs import hanging_segment, hangs
+from manikin.body.limbs import ends_before_tip, hanging_segment, hangs
 from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, SolePart
 from manikin.kinematics.posture_terms import SINKING
 from manikin.numerics.spatial import FloatArray
@@ -359,12 +359,14 @@ class KeptDistances:
     ) -> "KeptDistances":  # fmt: skip
         """Those of contacts at a point while they are held, such as the heel of a hand below its palm.
 
-        The segments that touch go at most 4 mm into what they touch. Nothing is kept of ``padded`` pairs.
+        The segments that touch go at most 4 mm into what they touch. It is asked of those that end before
+        their point; a palm that touches with its middle would have to lie flat. Nothing is kept of ``padded``
+        pairs.
         """
         held, phases = dict[Ignored, FloatArray](), schedule.phase_at(time)
         for number, phase in enumerate(schedule.sequence):
             for contact in phase.stance:
-                if contact.kind is ContactKind.POINT:
+                if contact.kind is ContactKind.POINT and ends_before_tip(body, contact.effector):
                     pairs = touch_pairs(body, scene, contact) - padded
                     wanted = held.setdefault(pairs, np.full(len(time), np.inf))
                     wanted[phases == number] = SINKING
