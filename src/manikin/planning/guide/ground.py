@@ -127,8 +127,8 @@ class GroundField:
         while (faced != faced[faced]).any():
             faced = faced[faced]
         self._then = np.where(down[faced], self._heading[faced] + math.pi, self._yaw)
-        ends = np.where(down[faced, None], points[faced, :2], middle[:2])
-        self._way = np.linalg.norm(points[:, :2] - ends, axis=1)
+        stops = np.where(down[faced, None], points[faced, :2], middle[:2])
+        self._way = np.linalg.norm(points[:, :2] - stops, axis=1)
 
     def _is_open(self, pairs: NDArray[np.int64], shares: FloatArray = BETWEEN) -> NDArray[np.bool_]:
         """(k,) whether the column passes between pairs (k, 2) of cells over what has no ground."""

@@ -40,7 +40,7 @@ class WholeBodyRequirements:
         com_error: Largest distance of the centre of mass from its plan [m].
         clearance: Least distance to obstacles and between body parts [m].
         penetration: Largest depth of anything in anything but what it holds on to, flights included [m].
-        sinking: Largest depth of what touches at a point, such as the heel of a hand, in what it touches [m].
+        sinking: Largest depth of what is held at a point beyond its shapes, as a hand on its heel [m].
         joint_limit: Largest violation of a joint range [rad].
         velocity_share: Largest share of a joint's velocity limit.
         missing_wrench: Largest part of the dynamics left without a contact force [N, N.m].
@@ -82,7 +82,7 @@ QUANTITIES: Mapping[str, tuple[str, str, Sense, str]] = MappingProxyType({
     "min_clearance_m": ("clearance", "m", ">=", "clearance"),
     "max_scuff_m": ("depth of a flight in what it leaves or reaches", "m", "<=", ""),
     "max_penetration_m": ("penetration", "m", "<=", "penetration"),
-    "max_sinking_m": ("depth of what touches at a point", "m", "<=", "sinking"),
+    "max_sinking_m": ("depth of what is held at a point", "m", "<=", "sinking"),
     "max_joint_limit_violation_rad": ("joint range violation", "rad", "<=", "joint_limit"),
     "max_velocity_share": ("share of a velocity limit", "", "<=", "velocity_share"),
     "max_missing_wrench": ("missing wrench", "N, N.m", "<=", "missing_wrench"),
